@@ -1,0 +1,73 @@
+"""The `teamclone` command: registers the commands and turns errors into one line and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+from teamclone.cli import (
+    bench,
+    dataset,
+    evaluate,
+    info,
+    ingest,
+    matches,
+    report,
+    sql,
+    train,
+    validate,
+)
+from teamclone.cli.common import fail
+from teamclone.errors import TeamcloneError, UsageError
+
+app = typer.Typer(
+    name="teamclone",
+    help="Learn how a RoboCup Soccer Simulation 2D team plays, from the logs of its matches.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (
+    info.info,
+    validate.validate,
+    ingest.ingest,
+    matches.matches,
+    sql.sql,
+    dataset.dataset,
+    train.train,
+    evaluate.evaluate,
+    report.report,
+    bench.bench,
+):
+    app.command()(command)
+
+
+@app.callback(invoke_without_command=True)
+def root(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+    if version:
+        from teamclone import __version__
+
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run a command. Exit codes: 0 fine, 1 the work failed, 2 wrong usage, 130 interrupted."""
+    try:
+        app()
+    except UsageError as error:
+        fail(str(error), code=2)
+    except TeamcloneError as error:
+        fail(str(error), code=1)
+    except KeyboardInterrupt:
+        fail("interrupted", code=130)
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`); leave without a traceback at interpreter exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        fail(f"{where}{error.strerror or error}", code=1)

@@ -1,0 +1,7 @@
+"""`teamclone bench`."""
+
+from __future__ import annotations
+
+
+def bench() -> None:
+    """To come."""

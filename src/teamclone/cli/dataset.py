@@ -1,0 +1,7 @@
+"""`teamclone dataset`."""
+
+from __future__ import annotations
+
+
+def dataset() -> None:
+    """To come."""

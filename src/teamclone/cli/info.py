@@ -1,0 +1,7 @@
+"""`teamclone info`."""
+
+from __future__ import annotations
+
+
+def info() -> None:
+    """To come."""

@@ -1,0 +1,7 @@
+"""`teamclone matches`."""
+
+from __future__ import annotations
+
+
+def matches() -> None:
+    """To come."""

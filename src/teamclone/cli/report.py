@@ -1,0 +1,7 @@
+"""`teamclone report`."""
+
+from __future__ import annotations
+
+
+def report() -> None:
+    """To come."""

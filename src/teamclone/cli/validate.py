@@ -1,0 +1,7 @@
+"""`teamclone validate`."""
+
+from __future__ import annotations
+
+
+def validate() -> None:
+    """To come."""

@@ -1,0 +1,60 @@
+"""The errors that teamclone raises: one root, the facts in attributes, the remedy in the text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class TeamcloneError(Exception):
+    """Something the user can act on. Its text is one line: what was expected, what was got, where, what to do."""
+
+
+class UsageError(TeamcloneError):
+    """A wrong option, key or name: the command line ends with exit code 2."""
+
+
+class LogError(TeamcloneError):
+    """A log file that cannot be read.
+
+    Args:
+        text: what is wrong and what to do.
+        path: the file.
+        line: line number in the decompressed file, from 1.
+        byte: offset in the decompressed file, from 0.
+        cycle: the server cycle that was being read.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        *,
+        path: Path | str | None = None,
+        line: int | None = None,
+        byte: int | None = None,
+        cycle: int | None = None,
+    ) -> None:
+        self.text, self.path, self.line, self.byte, self.cycle = text, path, line, byte, cycle
+        super().__init__(place(path=path, line=line, byte=byte, cycle=cycle) + text)
+
+
+def place(
+    *, path: Path | str | None = None, line: int | None = None, byte: int | None = None, cycle: int | None = None
+) -> str:
+    """Where something is, as the prefix of a message: ``match.rcg.gz: line 12: cycle 57: ``."""
+    parts = [] if path is None else [str(path)]
+    for name, value in (("line", line), ("byte", byte), ("cycle", cycle)):
+        if value is not None:
+            parts.append(f"{name} {value}")
+    return "".join(f"{part}: " for part in parts)
+
+
+class StoreError(TeamcloneError):
+    """A store that is missing, foreign, of another format number, or that cannot be written."""
+
+
+class DatasetError(TeamcloneError):
+    """A dataset that is missing, foreign, of another format number, or empty after cleaning."""
+
+
+class RunError(TeamcloneError):
+    """A run folder that is missing, incomplete or of another format number."""

@@ -1,0 +1,43 @@
+"""The raw state: the only input of every model, in training, evaluation, export and live play."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from teamclone.dataset.layout import PLAYER_CHANNELS
+from teamclone.rcss.player_types import FIELDS
+
+
+class State(NamedTuple):
+    """A batch of situations, in metres, metres per cycle and degrees; the modelled team attacks +x and comes first.
+
+    Attributes:
+        ball: (batch, 4) x, y, vx, vy.
+        players: (batch, 22, len(PLAYER_CHANNELS)); NaN where the log lacks a value.
+        types: (batch, 22, len(player_types.FIELDS)), each player's physical parameters.
+        actor: (batch,) int64, place 0..10 of the player who acts.
+    """
+
+    ball: Tensor
+    players: Tensor
+    types: Tensor
+    actor: Tensor
+
+    def to(self, device: torch.device) -> State:
+        return State(*(tensor.to(device, non_blocking=True) for tensor in self))
+
+
+class Target(NamedTuple):
+    """What the player did: kind (batch,) int64 index into CLONED_KINDS; parameters (batch, 2) in power and degrees."""
+
+    kind: Tensor
+    parameters: Tensor
+
+
+CHANNEL = {name: index for index, name in enumerate(PLAYER_CHANNELS)}
+"""Place of a channel in ``State.players``."""
+TYPE_FIELD = {name: index for index, name in enumerate(FIELDS)}
+"""Place of a parameter in ``State.types``."""

@@ -1,0 +1,88 @@
+"""Commands that clients send, and the four that a clone predicts.
+
+Ids are stable: they are written into stores and datasets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class CommandKind(IntEnum):
+    """Every message a player, coach or trainer may send; ``.name.lower()`` is the word in the log."""
+
+    ILLEGAL = 0
+    """Text that the server's parser does not know."""
+    DASH = 1
+    TURN = 2
+    KICK = 3
+    TACKLE = 4
+    CATCH = 5
+    MOVE = 6
+    TURN_NECK = 7
+    CHANGE_VIEW = 8
+    CHANGE_FOCUS = 9
+    SAY = 10
+    POINTTO = 11
+    ATTENTIONTO = 12
+    DONE = 13
+    INIT = 14
+    RECONNECT = 15
+    BYE = 16
+    SENSE_BODY = 17
+    SCORE = 18
+    EAR = 19
+    CLANG = 20
+    COMPRESSION = 21
+    SYNCH_SEE = 22
+    GAUSSIAN_SEE = 23
+    LONG_KICK = 24
+    EYE = 25
+    CHANGE_PLAYER_TYPE = 26
+    TEAM_GRAPHIC = 27
+    TEAM_NAMES = 28
+    START = 29
+    CHANGE_MODE = 30
+    RECOVER = 31
+    CHECK_BALL = 32
+    LOOK = 33
+
+
+BODY_KINDS = (
+    CommandKind.DASH,
+    CommandKind.TURN,
+    CommandKind.KICK,
+    CommandKind.TACKLE,
+    CommandKind.CATCH,
+    CommandKind.MOVE,
+)
+"""Commands of which the server takes one per player and cycle, the first (rcssserver `player.cpp`)."""
+
+CLONED_KINDS = (CommandKind.DASH, CommandKind.TURN, CommandKind.KICK, CommandKind.TACKLE)
+"""The commands a model predicts, in the order of its output classes (Table II of the paper)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """One parameter of a cloned command: its command, its place in the command, its unit and range."""
+
+    name: str
+    kind: CommandKind
+    argument: int
+    unit: str
+    limit: float
+    """The server clips to ±limit; dividing by it projects onto [-1, 1]."""
+    angle: bool
+    """True where ±limit are the same direction."""
+
+
+PARAMETERS = (
+    Parameter(name="dash_power", kind=CommandKind.DASH, argument=0, unit="power", limit=100.0, angle=False),
+    Parameter(name="dash_direction", kind=CommandKind.DASH, argument=1, unit="deg", limit=180.0, angle=True),
+    Parameter(name="turn_moment", kind=CommandKind.TURN, argument=0, unit="deg", limit=180.0, angle=True),
+    Parameter(name="kick_power", kind=CommandKind.KICK, argument=0, unit="power", limit=100.0, angle=False),
+    Parameter(name="kick_direction", kind=CommandKind.KICK, argument=1, unit="deg", limit=180.0, angle=True),
+    Parameter(name="tackle_direction", kind=CommandKind.TACKLE, argument=0, unit="deg", limit=180.0, angle=True),
+)
+"""The regression outputs in the order of Table II of the paper."""

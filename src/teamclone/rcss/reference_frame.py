@@ -1,0 +1,27 @@
+"""The one frame of reference of a model: its team attacks +x.
+
+The server logs both teams in one frame (origin at the centre spot, +x to the goal that the left team attacks,
++y downwards on a monitor, degrees from +x towards +y). For a team on the right side the scene is rotated by 180
+degrees, which is its own inverse. Arguments of dash, turn, kick and tackle are relative to the body: they stay.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def rotate_point(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Positions in metres or velocities in metres per cycle, any shape, seen from the other side. Its own inverse."""
+    return -values
+
+
+def rotate_angle(degrees: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Global directions in degrees, any shape, seen from the other side, in [-180, 180). Its own inverse modulo 360."""
+    return wrap_degrees(degrees + 180.0)
+
+
+def wrap_degrees(degrees: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The same directions in [-180, 180)."""
+    wrapped: NDArray[np.floating] = np.mod(degrees + 180.0, 360.0) - 180.0
+    return wrapped

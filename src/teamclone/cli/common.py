@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Sequence
-from typing import Any, NoReturn
+from enum import StrEnum
+from typing import Any, NoReturn, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+from teamclone.errors import UsageError
+
+E = TypeVar("E", bound=StrEnum)
 
 
 def fail(text: str, *, code: int) -> NoReturn:
@@ -25,7 +31,7 @@ def print_json(value: Any) -> None:
 
 def _finite(value: Any) -> Any:
     if isinstance(value, float):
-        return value if value == value and abs(value) != float("inf") else None
+        return value if math.isfinite(value) else None
     if isinstance(value, dict):
         return {str(key): _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -59,3 +65,12 @@ def progress(what: str) -> Progress:
         console=console,
         disable=not console.is_terminal,
     )
+
+
+def choice(kind: type[E], value: str, *, option: str) -> E:
+    """A member of a StrEnum by its value; a usage error that lists the choices where there is none."""
+    try:
+        return kind(value)
+    except ValueError:
+        known = ", ".join(member.value for member in kind)
+        raise UsageError(f"{option} {value!r} is unknown, choose one of: {known}") from None

@@ -2,6 +2,94 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated, Any
 
-def dataset() -> None:
-    """To come."""
+import typer
+
+from teamclone.cli.common import choice, print_json, print_table, progress
+
+
+def dataset(
+    store: Annotated[Path, typer.Option(help="The store to read, see `teamclone ingest`.")],
+    team: Annotated[str, typer.Option(help="The team to clone, as its logs name it.")],
+    out: Annotated[Path, typer.Option(help="The folder to write.")],
+    unseen: Annotated[list[str] | None, typer.Option(help="An opponent to keep out of training; repeatable.")] = None,
+    split: Annotated[str, typer.Option(help="match: whole matches; rows: the paper's, which leaks.")] = "match",
+    commands: Annotated[str, typer.Option(help="executed: what the server did; received: also refused ones.")] = (
+        "executed"
+    ),
+    turn_zero: Annotated[str, typer.Option(help="keep or drop (turn 0), which means doing nothing.")] = "keep",
+    test: Annotated[float, typer.Option(help="Share of the matches for the test.", min=0, max=0.9)] = 0.15,
+    validation: Annotated[float, typer.Option(help="Share of the matches for validation.", min=0, max=0.9)] = 0.15,
+    test_match: Annotated[
+        list[str] | None, typer.Option(help="Match id or part of a log name that must be a test match; repeatable.")
+    ] = None,
+    validation_match: Annotated[list[str] | None, typer.Option(help="The same for validation; repeatable.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
+    replace: Annotated[bool, typer.Option(help="Put it in the place of a dataset that is already there.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the cleaning report as JSON.")] = False,
+) -> None:
+    """Clean a store and bind every command of a team to the state it was decided on."""
+    from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
+    from teamclone.dataset.clean import Commands, TurnZero
+    from teamclone.store import open_store
+
+    config = DatasetConfig(
+        team=team,
+        unseen=tuple(unseen or ()),
+        split=choice(SplitBy, split, option="--split"),
+        commands=choice(Commands, commands, option="--commands"),
+        turn_zero=choice(TurnZero, turn_zero, option="--turn-zero"),
+        test_matches=tuple(test_match or ()),
+        validation_matches=tuple(validation_match or ()),
+        test=test,
+        validation=validation,
+        seed=seed,
+    )
+    with progress("dataset") as bar:
+        task = bar.add_task("", total=None)
+        report = build_dataset(
+            config,
+            store=open_store(store),
+            out=out,
+            replace=replace,
+            on_progress=lambda done, total, name: bar.update(task, completed=done, total=total, description=name),
+        )
+    if json:
+        print_json(report)
+    else:
+        _print(report, out)
+
+
+def _print(report: dict[str, Any], out: Path) -> None:
+    print_table(
+        ["cleaning rule", "before", "after", "dropped"],
+        [
+            (rule["name"], f"{rule['before']:,}", f"{rule['after']:,}", f"{rule['before'] - rule['after']:,}")
+            for rule in report["rules"]
+        ],
+        numeric=(1, 2, 3),
+    )
+    print()
+    kinds = list(next(iter(report["rows"].values())))
+    splits = {split: counts for split, counts in report["rows"].items() if sum(counts.values())}
+    matches_of = {split: sum(match["split"] == split for match in report["matches"]) for split in splits}
+    print_table(
+        ["split", "matches", *kinds, "rows"],
+        [
+            (split, matches_of[split] or "-", *(f"{count:,}" for count in counts.values()), f"{sum(counts.values()):,}")
+            for split, counts in splits.items()
+        ],
+        numeric=range(1, len(kinds) + 3),
+    )
+    print()
+    share = report["idle"] / max(report["player_cycles"], 1)
+    print(
+        f"{report['idle']:,} of {report['player_cycles']:,} player-cycles in play_on ({share:.1%}) have no body command, "
+        f"{report['frozen']:,} of them after a tackle or foul."
+    )
+    print(f"{report['turn_zero']:,} rows are (turn 0).")
+    if report["matches_without_team"]:
+        print(f"{report['matches_without_team']} match(es) of the store are without {report['team']}.")
+    print(f"Wrote {out}")

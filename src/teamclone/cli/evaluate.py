@@ -2,6 +2,107 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated, Any
 
-def evaluate() -> None:
-    """To come."""
+import typer
+
+from teamclone.cli.common import print_json, print_table, progress
+
+
+def evaluate(
+    run: Annotated[Path, typer.Argument(help="Run folder made by `teamclone train`.")],
+    data: Annotated[Path | None, typer.Option(help="Evaluate on another dataset than the run's own.")] = None,
+    checkpoint: Annotated[str, typer.Option(help="Which weights: best-loss, best-accuracy, last and so on.")] = (
+        "best-loss"
+    ),
+    seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
+) -> None:
+    """Say how good a clone is: on test matches, against unseen opponents, and beside rules without a network."""
+    from teamclone.evaluation.evaluate import evaluate as run_evaluation
+    from teamclone.evaluation.evaluate import save_evaluation
+    from teamclone.training.run import open_run
+
+    opened = open_run(run)
+    with progress("evaluate") as bar:
+        task = bar.add_task("", total=None)
+        result = run_evaluation(
+            opened,
+            dataset=data,
+            checkpoint=checkpoint,
+            seed=seed,
+            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    path = save_evaluation(opened, result)
+    if as_json:
+        print_json(result)
+        return
+    print_summary(result)
+    print(f"Wrote {path}")
+
+
+def print_summary(evaluation: dict[str, Any]) -> None:
+    """The figures of an evaluation that fit on a screen."""
+    splits = evaluation["splits"]
+    print(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
+    seen = evaluation["dataset"]["trained_on_before"]
+    if seen:
+        print(f"Caution: {len(seen)} of these matches were in training.")
+    print()
+    figures = (("accuracy", "accuracy", 3), ("cross_entropy", "CE, nats", 3), ("ece", "ECE", 3), ("brier", "Brier", 3))
+    rows = []
+    for name, split in splits.items():
+        size = (name, len(split["matches"]), f"{split['rows']:,}")
+        rows.append((*size, "clone", *(_cell(split["model"][key], digits) for key, _, digits in figures)))
+        rows += [
+            ("", "", "", rule, *(_cell(row[key], digits) for key, _, digits in figures))
+            for rule, row in split["baselines"].items()
+        ]
+    print_table(["split", "matches", "rows", "", *(name for _, name, _ in figures)], rows, numeric=(1, 2, 4, 5, 6, 7))
+    if any(len(split["matches"]) == 1 for split in splits.values()):
+        print("No interval where a split has one match: matches, not rows, vary independently.")
+    for name in [name for name in ("test", "unseen") if name in splits] or list(splits):
+        split = splits[name]
+        print()
+        print_table(
+            [name, "given", "predicted", "precision", "recall", "specificity", "F1"],
+            [
+                (
+                    command,
+                    f"{row['support']:,}",
+                    f"{row['predicted']:,}",
+                    *(_cell(row[key], 3) for key in ("precision", "recall", "specificity", "f1")),
+                )
+                for command, row in split["commands"].items()
+            ],
+            numeric=range(1, 7),
+        )
+        print()
+        print_table(
+            [name, "unit", "commands", "mean error", "median error", "constant guess, mean error"],
+            [
+                (
+                    parameter.replace("_", " "),
+                    row["unit"],
+                    f"{row['rows']:,}",
+                    _cell(row["mean"], 1),
+                    _number(row["median"], 1),
+                    _number(row["constant"]["mean"], 1),
+                )
+                for parameter, row in split["parameters"].items()
+            ],
+            numeric=range(2, 6),
+        )
+    print()
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _cell(figure: dict[str, float | None], digits: int) -> str:
+    text = _number(figure["value"], digits)
+    if figure["low"] is None or figure["high"] is None:
+        return text
+    return f"{text} [{figure['low']:.{digits}f}, {figure['high']:.{digits}f}]"

@@ -2,6 +2,106 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-def train() -> None:
-    """To come."""
+import typer
+
+from teamclone.cli.common import fail, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from teamclone.training.loop import Progress
+    from teamclone.training.run import Run
+
+
+def _show_preset(name: str | None) -> None:
+    if name is not None:
+        from teamclone.training.config import preset_text
+
+        typer.echo(preset_text(name), nl=False)
+        raise typer.Exit
+
+
+def train(
+    dataset: Annotated[Path, typer.Argument(help="Dataset made by `teamclone dataset`.")],
+    out: Annotated[Path, typer.Option("--out", help="Run folder to make, or to go on with.")],
+    preset: Annotated[
+        str | None, typer.Option(help="Settings to start from: paper or small; default small.", show_default=False)
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change one setting: train.epochs=50.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the run in --out stopped.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    show_preset: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", is_eager=True, callback=_show_preset, help="Print a preset and stop."),
+    ] = None,
+) -> None:
+    """Train a clone on a dataset. The run folder is all that evaluation and export need."""
+    from teamclone.dataset.reader import open_dataset
+    from teamclone.training import loop
+    from teamclone.training.config import load_config, override
+    from teamclone.training.run import is_run, open_run
+
+    if resume and preset is None:
+        config = override(open_run(out).config, overrides or [])
+    else:
+        config = load_config(preset or "small", overrides or [])
+    opened = open_dataset(dataset)
+    try:
+        with progress("train") as bar:
+            report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines
+            run = loop.train(config, opened, out, resume=resume, on_progress=report)
+    except KeyboardInterrupt:
+        finished = len(open_run(out).history()) if is_run(out) else 0
+        again = f"teamclone train {dataset} --out {out} --resume"
+        fail(f"interrupted; {finished} finished epochs are kept; go on with `{again}`", code=130)
+    _summary(run, as_json=as_json)
+
+
+def _bar(task: int, update: Callable[..., None]) -> Callable[[Progress], None]:
+    """Progress as a bar, one step a batch."""
+    text = ""
+
+    def report(at: Progress) -> None:
+        nonlocal text
+        if at.record is not None:
+            text = _line(at)
+        update(task, total=at.epochs * at.batches, completed=(at.epoch - 1) * at.batches + at.batch, description=text)
+
+    return report
+
+
+def _lines(at: Progress) -> None:
+    """Progress as about ten lines in all, for logs."""
+    tenth = at.epochs / 10
+    if at.record is not None and (at.epoch == 1 or int(at.epoch / tenth) > int((at.epoch - 1) / tenth)):
+        print(f"epoch {at.epoch}/{at.epochs}: {_line(at)}", file=sys.stderr, flush=True)
+
+
+def _line(at: Progress) -> str:
+    record = at.record or {}
+    return (
+        f"loss {record['validation_loss']:.4f}  accuracy {record['validation_accuracy']:.4f}  "
+        f"{record['samples_per_s']:,.0f} samples/s"
+    )
+
+
+def _summary(run: Run, *, as_json: bool) -> None:
+    history = run.history()
+    if as_json:
+        best = {
+            best.checkpoint: {"figure": best.figure, "epoch": best.epoch, "value": best.value} for best in run.best()
+        }
+        print_json({"run": str(run.path), "epochs": len(history), "best": best, "last": history[-1]})
+        return
+    print_table(
+        ("checkpoint", "epoch", "figure", "value"),
+        [(best.checkpoint, best.epoch, best.figure, f"{best.value:.4f}") for best in run.best()],
+        title=f"{run.path}: {len(history)} epochs, {history[-1]['samples_per_s']:,.0f} samples/s",
+        numeric=(1, 3),
+    )

@@ -2,6 +2,84 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-def validate() -> None:
-    """To come."""
+import typer
+
+if TYPE_CHECKING:
+    from teamclone.store.validate import Verdict
+
+
+def validate(
+    paths: Annotated[list[Path] | None, typer.Argument(help="Logs, folders of logs, or stores.")] = None,
+    store: Annotated[Path | None, typer.Option(help="Check the matches of this store.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a match, each on a line.")] = False,
+) -> None:
+    """Check logs or a store: can all be read, and is it possible? Exit code 1 if anything is wrong."""
+    import json
+    from itertools import chain
+
+    from teamclone.cli.common import progress
+    from teamclone.errors import UsageError
+    from teamclone.store import is_store, open_store
+    from teamclone.store.validate import validate_logs, validate_store
+
+    logs = [path for path in paths or [] if not is_store(path)]
+    stores = [path for path in paths or [] if is_store(path)] + ([store] if store is not None else [])
+    if not logs and not stores:
+        raise UsageError("expected logs, folders of logs or --store DIR, got nothing to validate")
+    wrong = total = 0
+    with progress("validate") as bar:
+        task = bar.add_task("", total=None)
+
+        def on_progress(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        for verdict in chain(
+            validate_logs(logs, jobs=jobs, on_progress=on_progress) if logs else (),
+            *(validate_store(open_store(path), on_progress=on_progress) for path in stores),
+        ):
+            print(json.dumps(as_object(verdict), ensure_ascii=False) if as_json else line(verdict))
+            total += 1
+            wrong += bool(verdict.wrong)
+    if not as_json:
+        print(f"{total} matches, {wrong} with something wrong")
+    if wrong:
+        raise typer.Exit(1)
+
+
+def line(verdict: Verdict) -> str:
+    """``ok     match.rcg.gz: 5999 frames, 700123 commands`` or ``wrong  ...`` with the first thing that is wrong."""
+    if not verdict.wrong:
+        return f"ok     {verdict.name}: {verdict.frames} frames, {verdict.commands} commands"
+    first, *more = verdict.wrong
+    first = " ".join(first.split())
+    name = "" if verdict.name in first else f"{verdict.name}: "
+    return f"wrong  {name}{first}" + (f" ({len(more)} more; --json lists all)" if more else "")
+
+
+def as_object(verdict: Verdict) -> dict[str, Any]:
+    """What ``--json`` prints of a match."""
+    from teamclone.cli.info import problem_json
+
+    return {
+        "name": verdict.name,
+        "match_id": verdict.match_id,
+        "ok": not verdict.wrong,
+        "frames": verdict.frames,
+        "commands": verdict.commands,
+        "error": verdict.error,
+        "problems": [problem_json(problem) for problem in verdict.problems],
+        "findings": [
+            {
+                "check": finding.check.name,
+                "about": finding.check.about,
+                "rows": finding.rows,
+                "cycle": finding.cycle,
+                "what": finding.what,
+            }
+            for finding in verdict.findings
+        ],
+    }

@@ -74,7 +74,9 @@ PLAYERS = (
     _column("view_quality", "uint8", "", "1 high, 0 low; 255 where the version lacks it"),
     _column("view_width", "float32", "deg", "opening of the view cone; NaN where the version lacks it"),
     _column("focus_distance", "float32", "m", "distance of the vision focus point; NaN before text version 6"),
-    _column("focus_direction", "float32", "deg", "direction of the focus point from the neck; NaN before text version 6"),
+    _column(
+        "focus_direction", "float32", "deg", "direction of the focus point from the neck; NaN before text version 6"
+    ),
     _column("stamina", "float32", "stamina", "stamina after this cycle's recovery; NaN where the version lacks it"),
     _column("effort", "float32", "", "dash efficiency; NaN where the version lacks it"),
     _column("recovery", "float32", "", "stamina recovery rate; NaN where the version lacks it"),
@@ -103,7 +105,9 @@ COMMANDS = (
     _column("unum", "uint8", "", "sender's number; 0 for a coach or the trainer"),
     _column("kind", "uint8", "", "command kind id, see the command_kinds table"),
     _column("legs", "uint8", "", "two-leg dash: 1 left leg, 2 right leg, 3 both; 0 for every other command"),
-    _column("valid", "bool", "", "false where the server's parser refuses it (NaN, unknown word, or after such an error)"),
+    _column(
+        "valid", "bool", "", "false where the server's parser refuses it (NaN, unknown word, or after such an error)"
+    ),
     _column("arg0", "float32", "", "first number (power, moment, direction); of a two-leg dash the left leg's power"),
     _column("arg1", "float32", "", "second number; of a two-leg dash the left leg's direction"),
     _column("arg2", "float32", "", "third number; of a two-leg dash the right leg's power"),

@@ -1,1 +1,10 @@
-"""."""
+"""Many matches as one SQL schema: ingest, query, check.
+
+The schema (``schema``), what becomes of a match (``convert``) and the checks (``checks``) know nothing of where a store
+keeps its rows; ``Store`` is what every back end offers and ``parquet`` is the embedded one.
+"""
+
+from teamclone.store.ingest import IngestReport, ingest
+from teamclone.store.store import Store, create_store, is_store, open_store
+
+__all__ = ["IngestReport", "Store", "create_store", "ingest", "is_store", "open_store"]

@@ -1,0 +1,274 @@
+"""From the columns of one match to samples: cleaning rules, binding, the modelled team's point of view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.dataset import layout
+from teamclone.logs.align import executed_kind, first_body_commands, slot_of
+from teamclone.logs.columns import counter_name
+from teamclone.logs.match import Columns
+from teamclone.rcss import state_bits
+from teamclone.rcss.commands import BODY_KINDS, CLONED_KINDS, CommandKind
+from teamclone.rcss.playmodes import PlayMode
+from teamclone.rcss.reference_frame import rotate_angle, rotate_point
+
+N_TEAM = 11
+
+FRAME_COLUMNS = ("cycle", "stoppage", "playmode", "left_score", "right_score", "ball_x", "ball_y", "ball_vx", "ball_vy")
+PLAYER_COLUMNS = (
+    "type",
+    "state",
+    "x",
+    "y",
+    "vx",
+    "vy",
+    "body",
+    "neck",
+    "view_width",
+    "stamina",
+    "effort",
+    "recovery",
+    "capacity",
+    *(counter_name(kind) for kind in BODY_KINDS),
+)
+COMMAND_COLUMNS = ("frame", "side", "unum", "kind", "legs", "valid", "arg0", "arg1", "arg2", "arg3")
+"""What cleaning needs of a match's tables."""
+
+_FLAGS = (
+    (layout.FLAG_ON_FIELD, state_bits.STAND),
+    (layout.FLAG_GOALIE, state_bits.GOALIE),
+    (layout.FLAG_TACKLING, state_bits.TACKLE | state_bits.TACKLE_FAULT),
+    (layout.FLAG_CHARGED, state_bits.FOUL_CHARGED),
+    (layout.FLAG_COLLIDED, state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE),
+    (layout.FLAG_YELLOW, state_bits.YELLOW_CARD),
+)
+
+
+class Commands(StrEnum):
+    """Which commands become samples."""
+
+    EXECUTED = "executed"
+    """Those whose counter rose: what the player did."""
+    RECEIVED = "received"
+    """The first of each cycle, also where the server refused it: what the player wanted."""
+
+
+class TurnZero(StrEnum):
+    """What becomes of ``(turn 0)``, by which many agents say that they do nothing."""
+
+    KEEP = "keep"
+    DROP = "drop"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """A cleaning step: how many commands it was given and how many it let through."""
+
+    name: str
+    before: int
+    after: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchSamples:
+    """One match, cleaned.
+
+    Attributes:
+        frames: layout.FRAME_ARRAYS without ``match``, only frames that have a sample.
+        samples: layout.SAMPLE_ARRAYS without ``split``; ``frame`` counts from this match's first kept frame.
+        rules: every cleaning step in order.
+        player_cycles: cycles x field players of the team on the field in play_on.
+        idle: those of them without any body command, and ``frozen`` those among them after a tackle or foul.
+    """
+
+    frames: Columns
+    samples: Columns
+    rules: tuple[Rule, ...]
+    player_cycles: int
+    idle: int
+    frozen: int
+
+
+def clean_match(
+    frames: Columns,
+    players: Columns,
+    commands: Columns,
+    server_params: Mapping[str, float | str],
+    *,
+    side: int,
+    keep: Commands = Commands.EXECUTED,
+    turn_zero: TurnZero = TurnZero.KEEP,
+) -> MatchSamples:
+    """Cleans and binds the commands of one team in one match.
+
+    Args:
+        frames: FRAME_COLUMNS, (n_frames,). players: PLAYER_COLUMNS, (n_frames, 22). commands: COMMAND_COLUMNS,
+            (n_commands,) in log order.
+        server_params: ranges of the arguments; the server's defaults where one is missing.
+        side: the modelled team's, 1 left or -1 right.
+    """
+    rules: list[Rule] = []
+
+    def narrow(rows: NDArray[np.int64], mask: NDArray[np.bool_], name: str) -> NDArray[np.int64]:
+        kept = rows[mask]
+        rules.append(Rule(name=name, before=len(rows), after=len(kept)))
+        return kept
+
+    rows = np.arange(len(commands["kind"]))
+    rows = narrow(rows, (commands["side"] == side) & (commands["unum"] > 0), "sent by a player of the team")
+    rows = narrow(rows, np.isin(commands["kind"][rows], BODY_KINDS), "body commands")
+    rows = narrow(rows, commands["valid"][rows], "parsed by the server (no NaN)")
+    n_frames = len(frames["cycle"])
+    frame = commands["frame"][rows]
+    rows = narrow(rows, (frame >= 0) & (frame < n_frames - 1), "bound to a frame that has a successor")
+    play_on = frames["playmode"] == PlayMode.PLAY_ON
+    rows = narrow(rows, play_on[commands["frame"][rows]], "in play_on")
+    slots = slot_of(commands["side"], commands["unum"])
+    goalie = (players["state"] & state_bits.GOALIE) != 0
+    rows = narrow(rows, ~goalie[commands["frame"][rows], slots[rows]], "of field players")
+    first = first_body_commands(commands, frames["playmode"], play_on=PlayMode.PLAY_ON)
+    rows = narrow(rows, np.isin(rows, first), "first of the cycle")
+    has_command = np.zeros_like(goalie)
+    has_command[commands["frame"][rows], slots[rows]] = True
+    rows = narrow(rows, np.isin(commands["kind"][rows], CLONED_KINDS), "dash, turn, kick or tackle")
+    executed = _executed(players, commands, rows, slots)
+    if keep is Commands.EXECUTED:
+        rows, executed = narrow(rows, executed, "executed by the server"), executed[executed]
+    is_turn_zero = (commands["kind"][rows] == CommandKind.TURN) & (commands["arg0"][rows] == 0)
+    if turn_zero is TurnZero.DROP:
+        rows, executed = narrow(rows, ~is_turn_zero, "not (turn 0)"), executed[~is_turn_zero]
+        is_turn_zero = is_turn_zero[~is_turn_zero]
+
+    own = slice(0, N_TEAM) if side > 0 else slice(N_TEAM, 2 * N_TEAM)
+    state = players["state"][:-1, own]
+    due = play_on[:-1, None] & ((state & state_bits.STAND) != 0) & ~goalie[:-1, own]
+    idle = due & ~has_command[:-1, own]
+    frozen = idle & ((state & (state_bits.TACKLE | state_bits.TACKLE_FAULT | state_bits.FOUL_CHARGED)) != 0)
+
+    unum = commands["unum"][rows].astype(np.int64)
+    order = np.lexsort((unum, commands["frame"][rows]))
+    rows, executed, is_turn_zero, unum = rows[order], executed[order], is_turn_zero[order], unum[order]
+    kept, local = np.unique(commands["frame"][rows], return_inverse=True)
+    kind_index = np.zeros(max(CommandKind) + 1, np.uint8)
+    kind_index[list(CLONED_KINDS)] = np.arange(len(CLONED_KINDS))
+    samples: Columns = {
+        "frame": local.astype(np.int32),
+        "player": (unum - 1).astype(np.uint8),
+        "kind": kind_index[commands["kind"][rows]],
+        "parameters": _parameters({name: commands[name][rows] for name in COMMAND_COLUMNS}, server_params),
+        "executed": executed,
+        "turn_zero": is_turn_zero,
+    }
+    return MatchSamples(
+        frames=_frames(frames, players, kept, side=side),
+        samples=samples,
+        rules=tuple(rules),
+        player_cycles=int(due.sum()),
+        idle=int(idle.sum()),
+        frozen=int(frozen.sum()),
+    )
+
+
+def _executed(
+    players: Columns, commands: Columns, rows: NDArray[np.int64], slots: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether the counter of each command's kind rose between its frame and the next."""
+    rose = np.zeros(len(rows), np.bool_)
+    for kind in CLONED_KINDS:
+        of_kind = commands["kind"][rows] == kind
+        frame, slot = commands["frame"][rows][of_kind], slots[rows][of_kind]
+        counter = players[counter_name(kind)]
+        rose[of_kind] = counter[frame + 1, slot] > np.maximum(counter[frame, slot], 0)
+    return rose
+
+
+def _parameters(commands: Columns, server_params: Mapping[str, float | str]) -> NDArray[np.float32]:
+    """Arguments as the server uses them (rcss.md 3.1), shape (n, 2): power and degrees, unused ones 0.
+
+    A two-leg dash is given as its sum: the mean of both legs' power vectors, as a power and a direction.
+    """
+
+    def limit(name: str, default: float) -> float:
+        value = server_params.get(name, default)
+        return float(value) if isinstance(value, float) else default
+
+    kind, legs = commands["kind"], commands["legs"]
+    arg = [commands[f"arg{index}"].astype(np.float64) for index in range(4)]
+    least, most = limit("min_dash_power", -100.0), limit("max_dash_power", 100.0)
+    step = limit("dash_angle_step", 1.0)
+
+    def dash(power: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:
+        direction = np.clip(direction, -180.0, 180.0)
+        return np.clip(power, least, most), np.rint(direction / step) * step if step > 0 else direction
+
+    values = np.zeros((len(kind), 2))
+    is_dash, is_legs = kind == CommandKind.DASH, legs > 0
+    plain = is_dash & ~is_legs
+    values[plain, 0], values[plain, 1] = dash(arg[0][plain], arg[1][plain])
+    if is_legs.any():
+        total = np.zeros(int(is_legs.sum()), np.complex128)
+        for power, direction in ((arg[0], arg[1]), (arg[2], arg[3])):
+            used, angle = dash(np.nan_to_num(power[is_legs]), np.nan_to_num(direction[is_legs]))
+            total += used * np.exp(1j * np.radians(angle)) / 2
+        values[is_legs, 0], values[is_legs, 1] = np.abs(total), np.degrees(np.angle(total))
+    turn = kind == CommandKind.TURN
+    values[turn, 0] = np.clip(arg[0][turn], limit("minmoment", -180.0), limit("maxmoment", 180.0))
+    kick = kind == CommandKind.KICK
+    values[kick, 0] = np.clip(arg[0][kick], limit("minpower", -100.0), limit("maxpower", 100.0))
+    values[kick, 1] = np.clip(arg[1][kick], -180.0, 180.0)
+    tackle = kind == CommandKind.TACKLE
+    values[tackle, 0] = np.clip(arg[0][tackle], -180.0, 180.0)
+    return values.astype(np.float32)
+
+
+def _frames(frames: Columns, players: Columns, kept: NDArray[np.int64], *, side: int) -> Columns:
+    """layout.FRAME_ARRAYS (without ``match``) of some frames, as the team on ``side`` sees them."""
+    axis = np.arange(2 * N_TEAM) if side > 0 else np.roll(np.arange(2 * N_TEAM), N_TEAM)
+    turned = side < 0
+
+    def seen(name: str) -> NDArray[Any]:
+        values: NDArray[Any] = players[name][np.ix_(kept, axis)]
+        return values
+
+    ball = np.stack([frames[name][kept] for name in ("ball_x", "ball_y", "ball_vx", "ball_vy")], axis=-1)
+    position = np.stack([seen("x"), seen("y")], axis=-1)
+    channels = {channel.name: None for channel in layout.DETAIL_CHANNELS}
+    detail: dict[str, NDArray[Any]] = {name: seen(name) for name in channels if name in players}
+    detail["vx"], detail["vy"] = seen("vx"), seen("vy")
+    if turned:
+        ball, position = rotate_point(ball), rotate_point(position)
+        detail["vx"], detail["vy"] = rotate_point(detail["vx"]), rotate_point(detail["vy"])
+        detail["body"] = rotate_angle(detail["body"])
+    state = seen("state")
+    detail["flags"] = sum(
+        (np.where((state & bits) != 0, flag, 0) for flag, bits in _FLAGS), np.zeros(state.shape, np.int64)
+    )
+    executed = executed_kind(players)
+    last = np.concatenate([np.zeros_like(executed[:1]), executed[:-1]])
+    detail["last_command"] = last[np.ix_(kept, axis)]
+    own, other = ("left_score", "right_score") if side > 0 else ("right_score", "left_score")
+    return {
+        "cycle": frames["cycle"][kept],
+        "playmode": frames["playmode"][kept],
+        "score": np.stack([np.clip(frames[name][kept], -128, 127) for name in (own, other)], axis=-1).astype(np.int8),
+        # Adding zero turns the -0.0 of logs and of the rotation into 0.0.
+        "ball": ball.astype(np.float32) + np.float32(0),
+        "position": position.astype(np.float32) + np.float32(0),
+        "detail": np.stack(
+            [_stored(detail[channel.name], channel.step) for channel in layout.DETAIL_CHANNELS], axis=-1
+        ),
+    }
+
+
+def _stored(values: NDArray[Any], step: float) -> NDArray[np.int16]:
+    """A channel as int16; NaN becomes layout.MISSING."""
+    scaled = np.rint(values.astype(np.float64) / step)
+    limited = np.clip(scaled, layout.MISSING + 1, 32767)
+    return np.where(np.isnan(scaled), layout.MISSING, limited).astype(np.int16)

@@ -1,0 +1,175 @@
+"""A dataset as batches: memory-mapped arrays, gathered by index into the raw state that models take."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from teamclone.dataset.layout import (
+    DETAIL_CHANNELS,
+    FORMAT,
+    FRAME_ARRAYS,
+    MISSING,
+    PLAYER_CHANNELS,
+    SAMPLE_ARRAYS,
+    STEPS,
+    Array,
+    Split,
+)
+from teamclone.errors import DatasetError
+from teamclone.models.state import State, Target
+from teamclone.rcss.commands import CLONED_KINDS, CommandKind
+from teamclone.rcss.player_types import FIELDS
+
+Rows = NDArray[np.int64] | Tensor
+"""Indices of samples, (batch,) int64."""
+
+_DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
+_STEPS = torch.from_numpy(STEPS)
+_CLASS_OF_KIND = torch.full((max(CommandKind) + 1,), -1, dtype=torch.int64)
+_CLASS_OF_KIND[torch.tensor(CLONED_KINDS)] = torch.arange(len(CLONED_KINDS))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dataset:
+    """A dataset that has been opened. Its arrays stay on disk; every method reads just the rows it is asked for.
+
+    Attributes:
+        path: its folder.
+        meta: ``dataset.json``.
+        frames: FRAME_ARRAYS by name, (n_frames, ...).
+        samples: SAMPLE_ARRAYS by name, (n_samples, ...).
+        player_types: (n_matches, n_types, len(FIELDS)) float32.
+    """
+
+    path: Path
+    meta: dict[str, Any]
+    frames: dict[str, Tensor]
+    samples: dict[str, Tensor]
+    player_types: Tensor
+
+    def __len__(self) -> int:
+        return len(self.samples["frame"])
+
+    @property
+    def id(self) -> str:
+        """A hash of the content: equal for equal datasets, wherever they lie."""
+        return str(self.meta["id"])
+
+    @property
+    def matches(self) -> list[dict[str, Any]]:
+        """What is known of each match: ``match_id``, ``opponent``, ``side``, ``split`` and more."""
+        return list(self.meta["matches"])
+
+    def split(self, split: Split) -> NDArray[np.int64]:
+        """The samples of a split, ascending."""
+        return np.flatnonzero(self.samples["split"].numpy() == int(split))
+
+    def state(self, rows: Rows) -> State:
+        """The situations in which the commands of these samples were decided, in the order asked for."""
+        rows = torch.as_tensor(rows)
+        frame = self.samples["frame"].index_select(0, rows)
+        detail = self.frames["detail"].index_select(0, frame)
+        players = torch.empty(len(rows), 22, len(PLAYER_CHANNELS))
+        players[..., :2] = self.frames["position"].index_select(0, frame)
+        torch.mul(detail, _STEPS, out=players[..., 2:])
+        missing = detail == MISSING
+        if missing.any():
+            players[..., 2:].masked_fill_(missing, math.nan)
+        n_types = self.player_types.shape[1]
+        place = self.frames["match"].index_select(0, frame)[:, None] * n_types + detail[..., _DETAIL["type"]]
+        types = self.player_types.reshape(-1, len(FIELDS)).index_select(0, place.reshape(-1))
+        return State(
+            ball=self.frames["ball"].index_select(0, frame),
+            players=players,
+            types=types.reshape(len(rows), 22, len(FIELDS)),
+            actor=self.samples["player"].index_select(0, rows).long(),
+        )
+
+    def target(self, rows: Rows) -> Target:
+        """What the players did."""
+        rows = torch.as_tensor(rows)
+        return Target(
+            kind=self.samples["kind"].index_select(0, rows).long(),
+            parameters=self.samples["parameters"].index_select(0, rows),
+        )
+
+    def last_kind(self, rows: Rows) -> Tensor:
+        """(batch,) int64: what the acting player executed one cycle before, as an index into CLONED_KINDS; -1 none."""
+        rows = torch.as_tensor(rows)
+        frame = self.samples["frame"].index_select(0, rows)
+        actor = self.samples["player"].index_select(0, rows)
+        kind = self.frames["detail"][frame.long(), actor.long(), _DETAIL["last_command"]].long()
+        return torch.where(kind == MISSING, -1, _CLASS_OF_KIND[kind.clamp(min=0)])
+
+    def match(self, rows: Rows) -> Tensor:
+        """(batch,) int64: index of each sample's match in `matches`."""
+        frame = self.samples["frame"].index_select(0, torch.as_tensor(rows))
+        return self.frames["match"].index_select(0, frame).long()
+
+
+def open_dataset(path: Path | str) -> Dataset:
+    """Open a dataset.
+
+    Raises:
+        DatasetError: it is missing, not a dataset, of another format number, or damaged.
+    """
+    folder = Path(path)
+    document = folder / "dataset.json"
+    if not document.is_file():
+        what = "no such folder" if not folder.exists() else "not a dataset, it has no dataset.json"
+        raise DatasetError(f"{folder}: {what}; make one with `teamclone dataset`")
+    try:
+        meta = json.loads(document.read_text(encoding="utf-8"))
+        found = meta["format"]
+    except (ValueError, TypeError, KeyError, IndexError) as error:
+        raise DatasetError(f"{document}: not the description of a dataset ({error!r})") from None
+    if found != FORMAT:
+        raise DatasetError(
+            f"{folder}: dataset of format {found}, this version reads {FORMAT}; make it again with `teamclone dataset`"
+        )
+    absent = [key for key in ("id", "team", "matches", "n_frames", "n_samples") if key not in meta]
+    if absent:
+        raise DatasetError(f"{document}: lacks {', '.join(absent)}; make it again with `teamclone dataset`")
+    types = _open(folder / "player_types.npy", dtype="float32", shape=(len(meta["matches"]), None, len(FIELDS)))
+    return Dataset(
+        path=folder.resolve(),
+        meta=meta,
+        frames=_table(folder / "frames", FRAME_ARRAYS, rows=meta["n_frames"]),
+        samples=_table(folder / "samples", SAMPLE_ARRAYS, rows=meta["n_samples"]),
+        player_types=types,
+    )
+
+
+def _table(folder: Path, arrays: tuple[Array, ...], *, rows: int) -> dict[str, Tensor]:
+    return {
+        array.name: _open(folder / f"{array.name}.npy", dtype=array.dtype, shape=(rows, *array.shape))
+        for array in arrays
+    }
+
+
+def _open(path: Path, *, dtype: str, shape: Sequence[int | None]) -> Tensor:
+    """Map an array into memory and see that it is what the layout says; None in ``shape`` is any length."""
+    try:
+        # Copy-on-write, because torch warns of read-only memory. Nothing here writes.
+        values: NDArray[Any] = np.load(path, mmap_mode="c", allow_pickle=False)
+    except FileNotFoundError:
+        raise DatasetError(f"{path}: missing; make the dataset again with `teamclone dataset`") from None
+    except (ValueError, EOFError) as error:
+        raise DatasetError(f"{path}: damaged ({error}); make the dataset again with `teamclone dataset`") from None
+    expected = tuple(got if want is None else want for want, got in zip(shape, values.shape, strict=False))
+    if values.dtype != np.dtype(dtype) or values.shape != expected or len(values.shape) != len(shape):
+        raise DatasetError(
+            f"{path}: expected {dtype} {tuple(shape)}, got {values.dtype} {values.shape}; "
+            "make the dataset again with `teamclone dataset`"
+        )
+    return torch.from_numpy(values)

@@ -1,0 +1,116 @@
+"""What needs no network: rules that know the training counts and, at most, the player's last command.
+
+A clone that does not beat them has learned nothing. Each gives probabilities, so that the same figures apply.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.evaluation.metrics import IS_ANGLE, N_KINDS, N_PARAMETERS, Counts, Floats
+from teamclone.evaluation.outcome import Outcome
+
+SMOOTHING = 1.0
+"""Added to every count (Laplace), so that what the training matches never showed keeps a probability."""
+
+NAMES = ("majority", "persistence", "markov")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Baselines:
+    """Counts of the training rows.
+
+    Attributes:
+        transitions: (5, 4) rows with [last executed command, command given]; last place of the first axis: none known.
+        parameters: (6,) the constant guess of each parameter: its median, around the circle for angles; NaN if unseen.
+    """
+
+    transitions: Counts
+    parameters: Floats
+
+    @property
+    def prior(self) -> Floats:
+        """(4,) smoothed share of every command in training."""
+        counts = self.transitions.sum(axis=0) + SMOOTHING
+        share: Floats = counts / counts.sum()
+        return share
+
+    def table(self, name: str) -> Floats:
+        """(5, 4) the probabilities a baseline gives after each last command; the last row is for "none known".
+
+        majority: the prior, whatever came before; its prediction is the most frequent command.
+        persistence: the last command with the share of repetitions in training, the rest split by the prior; the
+            prior where no last command is known.
+        markov: smoothed share of each command after the last one.
+        """
+        prior = self.prior
+        if name == "majority":
+            return np.tile(prior, (N_KINDS + 1, 1))
+        if name == "persistence":
+            pairs = self.transitions[:N_KINDS]
+            repeats = (np.trace(pairs) + SMOOTHING) / (pairs.sum() + 2 * SMOOTHING)
+            # It predicts the repetition by definition, so the repetition stays the most probable.
+            repeats = max(float(repeats), 0.5)
+            table = np.tile(prior, (N_KINDS + 1, 1))
+            for kind in range(N_KINDS):
+                others = prior.copy()
+                others[kind] = 0.0
+                table[kind] = (1.0 - repeats) * others / others.sum()
+                table[kind, kind] = repeats
+            return table
+        if name == "markov":
+            counts = self.transitions + SMOOTHING
+            smoothed: Floats = counts / counts.sum(axis=1, keepdims=True)
+            return smoothed
+        raise ValueError(f"unknown baseline {name!r}, expected one of {', '.join(NAMES)}")
+
+    def answer(self, name: str, outcome: Outcome) -> Outcome:
+        """The same rows with a baseline's answers in place of the model's."""
+        probabilities = self.table(name)[outcome.last].astype(np.float32)  # -1, none known, is the last row
+        parameters = np.broadcast_to(self.parameters.astype(np.float32), outcome.parameters.shape)
+        return replace(outcome, probabilities=probabilities, parameters=parameters)
+
+
+@dataclass(slots=True)
+class Counter:
+    """Counts training rows batch by batch: parameters in steps of one unit or degree, which is all a median needs."""
+
+    transitions: Counts
+    histograms: Counts
+
+    @classmethod
+    def empty(cls) -> Counter:
+        """Nothing counted yet."""
+        return cls(
+            transitions=np.zeros((N_KINDS + 1, N_KINDS), np.int64), histograms=np.zeros((N_PARAMETERS, 361), np.int64)
+        )
+
+    def add(self, *, kind: NDArray[np.integer], last: NDArray[np.integer], issued: NDArray[np.floating]) -> None:
+        """Count rows: kind and last (n,), issued (n, 6) with NaN for parameters of other commands."""
+        np.add.at(self.transitions, (last, kind), 1)
+        for index, column in enumerate(issued.T):
+            steps = np.rint(column[np.isfinite(column)]).astype(np.int64)
+            self.histograms[index] += np.bincount(np.clip(steps, -180, 180) + 180, minlength=361)
+
+    def finish(self) -> Baselines:
+        """The baselines of everything counted."""
+        parameters = np.array(
+            [_median(counts, angle=bool(angle)) for counts, angle in zip(self.histograms, IS_ANGLE, strict=True)]
+        )
+        return Baselines(transitions=self.transitions, parameters=parameters)
+
+
+def _median(counts: Counts, *, angle: bool) -> float:
+    """The value in -180..180 with the least mean absolute distance to all, around the circle for angles."""
+    if not counts.any():
+        return float("nan")
+    values = np.arange(-180, 181)
+    distance = np.abs(values[:, None] - values[None, :])
+    if angle:
+        distance = np.minimum(distance, 360 - distance)
+    cost = distance @ counts
+    best = values[cost == cost.min()]
+    return float(best[np.abs(best).argmin()])

@@ -1,0 +1,142 @@
+"""How long one answer takes (Fig. 9 of the paper): single predictions on one thread, real situations."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import platform
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+import teamclone
+from teamclone.dataset.reader import Dataset
+from teamclone.errors import DatasetError, RunError
+from teamclone.evaluation.evaluate import model_id
+from teamclone.models.state import State
+
+if TYPE_CHECKING:
+    from teamclone.models.network import Clone
+
+FORMAT = 1
+"""Of bench.json."""
+N_PREDICTIONS = 20_000
+WARM_UP = 200
+TEAM = 22
+"""States of a batch: every player of a cycle, modelled as one team or as two."""
+N_STATES = 512
+"""Different situations that the predictions take in turn."""
+
+
+def measure_latency(
+    model: Clone,
+    dataset: Dataset,
+    *,
+    n: int = N_PREDICTIONS,
+    seed: int = 0,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Times of ``n`` predictions of one state each and of batches of 22, in microseconds, on one thread of the CPU.
+
+    Timed is what a user calls: raw state in, probabilities and parameters out, features and normalisation included;
+    reading the state is not.
+
+    Raises:
+        DatasetError: the dataset has no samples.
+    """
+    if not len(dataset):
+        raise DatasetError(f"{dataset.path}: no samples to predict; build the dataset from more matches")
+    rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + TEAM)
+    states = dataset.state(rows)
+    singles = [_slice(states, start, 1) for start in range(N_STATES)]
+    teams = [_slice(states, start, TEAM) for start in range(N_STATES)]
+    model = model.cpu().eval()
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        single = _times(model, singles, n, on_progress)
+        team = _times(model, teams, max(n // 20, 20), None)
+    finally:
+        torch.set_num_threads(threads)
+    top = float(np.quantile(single, 0.995))
+    counts, edges = np.histogram(single[single <= top], bins=80)
+    return {
+        "format": FORMAT,
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "model_id": model_id(model),
+        "versions": {"teamclone": teamclone.__version__, "torch": torch.__version__, "numpy": np.__version__},
+        "machine": {"processor": _processor(), "system": platform.platform(terse=True), "threads": 1},
+        "single": _summary(single),
+        "team": {"states": TEAM, **_summary(team), "states_per_second": float(TEAM / np.mean(team) * 1e6)},
+        "histogram": {
+            "edges_us": np.round(edges, 3).tolist(),
+            "counts": counts.tolist(),
+            "slower": int((single > top).sum()),
+        },
+    }
+
+
+def _slice(states: State, start: int, length: int) -> State:
+    return State(*(tensor[start : start + length].contiguous() for tensor in states))
+
+
+def _times(
+    model: Clone, states: list[State], n: int, on_progress: Callable[[int, int], None] | None
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    times = np.empty(n, np.float64)
+    with torch.inference_mode():
+        for index in range(min(WARM_UP, n)):
+            model.predict(states[index % len(states)])
+        for index in range(n):
+            state = states[index % len(states)]
+            start = time.perf_counter_ns()
+            model.predict(state)
+            times[index] = (time.perf_counter_ns() - start) / 1e3
+            if on_progress is not None and (index + 1) % 500 == 0:
+                on_progress(index + 1, n)
+    return times
+
+
+def _summary(times: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
+    return {
+        "n": len(times),
+        "mean_us": float(times.mean()),
+        "std_us": float(times.std()),
+        "p50_us": float(np.quantile(times, 0.5)),
+        "p99_us": float(np.quantile(times, 0.99)),
+        "max_us": float(times.max()),
+    }
+
+
+def _processor() -> str:
+    """The processor's name, where the system tells it."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def load_bench(path: Path | str) -> dict[str, Any]:
+    """Read bench.json back.
+
+    Raises:
+        RunError: missing, damaged or of another format number.
+    """
+    path = Path(path)
+    try:
+        bench: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        found = bench["format"]
+    except FileNotFoundError:
+        raise RunError(f"{path}: missing; make it with `teamclone bench`") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{path}: not a benchmark ({error!r}); make it again with `teamclone bench`") from None
+    if found != FORMAT:
+        raise RunError(f"{path}: format {found}, this version reads {FORMAT}; run `teamclone bench` again")
+    return bench

@@ -1,0 +1,296 @@
+"""Figures of merit. One pass sums what is needed per match; every figure is derived from such sums.
+
+The confusion matrix comes first: rates are never averaged over batches or rows, only counts are. Because every figure
+is a function of sums over matches, the same functions give the figure of one match, of an opponent, of a split, and of
+a thousand bootstrap resamples at once (`evaluation.bootstrap`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.evaluation.outcome import Outcome
+from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+from teamclone.rcss.reference_frame import wrap_degrees
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+N_KINDS = len(CLONED_KINDS)
+N_PARAMETERS = len(PARAMETERS)
+CALIBRATION_BINS = 15
+LIMITS: Floats = np.array([parameter.limit for parameter in PARAMETERS])
+IS_ANGLE: NDArray[np.bool_] = np.array([parameter.angle for parameter in PARAMETERS])
+
+
+class Sums(NamedTuple):
+    """What every figure is computed from. Leading axes (...) are matches or resamples; none for a total.
+
+    Attributes:
+        confusion: (..., 4, 4) rows with [command given, command predicted].
+        log_loss: (...) sum of -ln(probability of the command given), nats.
+        brier: (...) sum of squared distances between probabilities and what happened, 0 to 2 a row.
+        bin_count: (..., bins) rows by confidence in the predicted command.
+        bin_confidence: (..., bins) their summed confidence.
+        bin_hits: (..., bins) those predicted right.
+        parameter_count: (..., 6) commands that carried the parameter.
+        parameter_error: (..., 6) their summed absolute error in power and circular degrees.
+        paper_error: (...) sum over rows of the mean over all six outputs, as the paper took it.
+    """
+
+    confusion: Floats
+    log_loss: Floats
+    brier: Floats
+    bin_count: Floats
+    bin_confidence: Floats
+    bin_hits: Floats
+    parameter_count: Floats
+    parameter_error: Floats
+    paper_error: Floats
+
+    def select(self, matches: NDArray[np.integer] | NDArray[np.bool_]) -> Sums:
+        """Some entries of the first axis."""
+        return Sums(*(values[matches] for values in self))
+
+    def total(self) -> Sums:
+        """Summed over the first axis."""
+        return Sums(*(values.sum(axis=0) for values in self))
+
+
+def confusion_matrix(kind: NDArray[np.integer], predicted: NDArray[np.integer]) -> Counts:
+    """(4, 4) rows with [command given, command predicted], from (n,) indices into CLONED_KINDS."""
+    counts = np.bincount(kind * N_KINDS + predicted, minlength=N_KINDS * N_KINDS)
+    return counts.astype(np.int64).reshape(N_KINDS, N_KINDS)
+
+
+def log_loss(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
+    """(n,) -ln of the probability of what happened, nats; a probability of 0 counts as the smallest float32 step."""
+    given = probabilities[np.arange(len(kind)), kind].astype(np.float64)
+    loss: Floats = -np.log(np.clip(given, np.finfo(np.float32).eps, 1.0))
+    return loss
+
+
+def brier(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
+    """(n,) squared distance to the one-hot truth, summed over the four commands (Brier 1950): 0 best, 2 worst."""
+    distance = probabilities.astype(np.float64)
+    distance[np.arange(len(kind)), kind] -= 1.0
+    squared: Floats = np.square(distance).sum(axis=1)
+    return squared
+
+
+def parameter_errors(predicted: NDArray[np.floating], issued: NDArray[np.floating]) -> Floats:
+    """(n, 6) absolute errors in power units and in degrees around the circle; NaN where nothing was issued.
+
+    Around the circle 179 and -179 degrees are 2 degrees apart.
+    """
+    difference = predicted.astype(np.float64) - issued.astype(np.float64)
+    difference[:, IS_ANGLE] = wrap_degrees(difference[:, IS_ANGLE])
+    error: Floats = np.abs(difference)
+    return error
+
+
+def paper_errors(predicted: NDArray[np.floating], issued: NDArray[np.floating]) -> Floats:
+    """(n,) the paper's regression error: the mean over six outputs in [-1, 1], zero expected where nothing was issued.
+
+    Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it says little about
+    the error of a command's parameter; it is here to be compared with the published 0.069.
+    """
+    wanted = np.nan_to_num(issued.astype(np.float64)) / LIMITS
+    error: Floats = np.abs(predicted.astype(np.float64) / LIMITS - wanted).mean(axis=1)
+    return error
+
+
+def confidence_edges(probabilities: NDArray[np.floating], bins: int = CALIBRATION_BINS) -> Floats:
+    """Inner edges that cut the rows into bins of equal mass by the probability of their predicted command.
+
+    Shape (bins - 1,) or fewer: equal confidences are never parted.
+    """
+    if len(probabilities) == 0:
+        return np.zeros(0)
+    return np.unique(np.quantile(probabilities.max(axis=1).astype(np.float64), np.arange(1, bins) / bins))
+
+
+def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, Sums]:
+    """The matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
+
+    Args:
+        outcome: what was predicted and what happened.
+        edges: inner edges of the confidence bins; None cuts this outcome into bins of equal mass.
+    """
+    edges = confidence_edges(outcome.probabilities) if edges is None else edges
+    matches, code = np.unique(outcome.match, return_inverse=True)
+    n_matches, n_bins = len(matches), len(edges) + 1
+    predicted = outcome.probabilities.argmax(axis=1)
+    confidence = outcome.probabilities.max(axis=1).astype(np.float64)
+    cell = code * n_bins + np.searchsorted(edges, confidence, side="right")
+    error = parameter_errors(outcome.parameters, outcome.issued)
+    known = np.isfinite(outcome.issued)
+
+    def by_match(values: NDArray[np.generic]) -> Floats:
+        return np.bincount(code, weights=values.astype(np.float64), minlength=n_matches).astype(np.float64)
+
+    def by_bin(values: NDArray[np.generic]) -> Floats:
+        sums = np.bincount(cell, weights=values.astype(np.float64), minlength=n_matches * n_bins)
+        return sums.astype(np.float64).reshape(n_matches, n_bins)
+
+    square = (code * N_KINDS + outcome.kind) * N_KINDS + predicted
+    confusion = np.bincount(square, minlength=n_matches * N_KINDS**2).reshape(n_matches, N_KINDS, N_KINDS)
+    sums = Sums(
+        confusion=confusion.astype(np.float64),
+        log_loss=by_match(log_loss(outcome.probabilities, outcome.kind)),
+        brier=by_match(brier(outcome.probabilities, outcome.kind)),
+        bin_count=by_bin(np.ones(len(outcome))),
+        bin_confidence=by_bin(confidence),
+        bin_hits=by_bin(predicted == outcome.kind),
+        parameter_count=np.stack([by_match(column) for column in known.T], axis=1),
+        parameter_error=np.stack([by_match(column) for column in np.where(known, error, 0.0).T], axis=1),
+        paper_error=by_match(paper_errors(outcome.parameters, outcome.issued)),
+    )
+    return matches.astype(np.int64), sums
+
+
+def ratio(numerator: NDArray[np.number], denominator: NDArray[np.number]) -> Floats:
+    """Element by element; NaN where the denominator is 0, because such a rate is undefined, not 0."""
+    top, bottom = np.broadcast_arrays(np.asarray(numerator, np.float64), np.asarray(denominator, np.float64))
+    result: Floats = np.divide(top, bottom, out=np.full(top.shape, np.nan), where=bottom != 0)
+    return result
+
+
+class Rates(NamedTuple):
+    """Per command, (..., 4): of a confusion matrix with TP, FP, FN, TN counted one command against the rest.
+
+    Attributes:
+        support: rows where the command was given, TP + FN.
+        predicted: rows where it was predicted, TP + FP.
+        precision: TP / (TP + FP).
+        recall: TP / (TP + FN), which the paper calls scaled accuracy.
+        specificity: TN / (TN + FP).
+        f1: harmonic mean of precision and recall, 2 TP / (2 TP + FP + FN).
+        share: TP / all rows, the command's part of the accuracy; the paper's "accuracy" of a command.
+        paper_recall: TP / (TP + every error predicted as another command), as the paper's code computed "recall".
+        paper_specificity: right answers of other commands / (these + FP), as the paper's code computed "specificity".
+    """
+
+    support: Floats
+    predicted: Floats
+    precision: Floats
+    recall: Floats
+    specificity: Floats
+    f1: Floats
+    share: Floats
+    paper_recall: Floats
+    paper_specificity: Floats
+
+
+def rates(confusion: NDArray[np.number]) -> Rates:
+    """Rates per command of (..., 4, 4) confusion matrices; NaN where undefined."""
+    confusion = np.asarray(confusion, np.float64)
+    hits = np.diagonal(confusion, axis1=-2, axis2=-1)
+    support, predicted = confusion.sum(axis=-1), confusion.sum(axis=-2)
+    everything = confusion.sum(axis=(-2, -1))[..., None]
+    right = hits.sum(axis=-1)[..., None]
+    false_positives = predicted - hits
+    negatives = everything - support
+    wrong_elsewhere = (everything - right) - false_positives
+    return Rates(
+        support=support,
+        predicted=predicted,
+        precision=ratio(hits, predicted),
+        recall=ratio(hits, support),
+        specificity=ratio(negatives - false_positives, negatives),
+        f1=ratio(2 * hits, support + predicted),
+        share=ratio(hits, everything),
+        paper_recall=ratio(hits, hits + wrong_elsewhere),
+        paper_specificity=ratio(right - hits, right - hits + false_positives),
+    )
+
+
+class Scores(NamedTuple):
+    """Figures of a whole set of rows, (...) each.
+
+    Attributes:
+        accuracy: share of rows whose command was predicted right.
+        cross_entropy: mean -ln(probability of the command given), nats.
+        brier: mean Brier score over the four commands, 0 to 2.
+        ece: expected calibration error: |confidence - accuracy| averaged over confidence bins by their rows
+            (Naeini et al. 2015, top label, bins of equal mass).
+        balanced_accuracy: mean recall over the commands that occur.
+        macro_f1: mean F1 over the commands that occur.
+        paper_mae: the paper's mean absolute error over all six normalised outputs, zeros included.
+    """
+
+    accuracy: Floats
+    cross_entropy: Floats
+    brier: Floats
+    ece: Floats
+    balanced_accuracy: Floats
+    macro_f1: Floats
+    paper_mae: Floats
+
+
+def scores(sums: Sums) -> Scores:
+    """Figures of every entry of the leading axes; NaN where there is no row."""
+    rows = sums.confusion.sum(axis=(-2, -1))
+    rate = rates(sums.confusion)
+    gap = np.abs(sums.bin_hits - sums.bin_confidence).sum(axis=-1)
+    return Scores(
+        accuracy=ratio(np.trace(sums.confusion, axis1=-2, axis2=-1), rows),
+        cross_entropy=ratio(sums.log_loss, rows),
+        brier=ratio(sums.brier, rows),
+        ece=ratio(gap, rows),
+        balanced_accuracy=_mean_where(rate.recall, rate.support > 0),
+        macro_f1=_mean_where(rate.f1, rate.support > 0),
+        paper_mae=ratio(sums.paper_error, rows),
+    )
+
+
+def _mean_where(values: Floats, where: NDArray[np.bool_]) -> Floats:
+    """Mean over the last axis of the values at True."""
+    return ratio(np.where(where, np.nan_to_num(values), 0.0).sum(axis=-1), where.sum(axis=-1))
+
+
+class Curve(NamedTuple):
+    """A reliability curve, (bins,) each: rows, mean probability said, share that came true."""
+
+    rows: Floats
+    said: Floats
+    came_true: Floats
+
+
+def top_label_curve(sums: Sums) -> Curve:
+    """How often the predicted command was right, by the confidence in it; bins without rows are left out."""
+    filled = sums.bin_count > 0
+    count = sums.bin_count[filled]
+    return Curve(rows=count, said=sums.bin_confidence[filled] / count, came_true=sums.bin_hits[filled] / count)
+
+
+def command_curve(outcome: Outcome, kind: int, bins: int = CALIBRATION_BINS) -> Curve:
+    """How often a command was given, by the probability said for it, over all rows in bins of equal mass."""
+    said = outcome.probabilities[:, kind].astype(np.float64)
+    if len(said) == 0:
+        return Curve(rows=np.zeros(0), said=np.zeros(0), came_true=np.zeros(0))
+    edges = np.unique(np.quantile(said, np.arange(1, bins) / bins))
+    place = np.searchsorted(edges, said, side="right")
+    count = np.bincount(place, minlength=len(edges) + 1).astype(np.float64)
+    filled = count > 0
+    total_said = np.bincount(place, weights=said, minlength=len(count))
+    total_true = np.bincount(place, weights=(outcome.kind == kind).astype(np.float64), minlength=len(count))
+    return Curve(
+        rows=count[filled],
+        said=(total_said / np.maximum(count, 1))[filled],
+        came_true=ratio(total_true, count)[filled],
+    )
+
+
+def median_errors(predicted: NDArray[np.floating], issued: NDArray[np.floating]) -> Floats:
+    """(6,) median absolute error of the commands that carried each parameter; NaN where none did."""
+    error = parameter_errors(predicted, issued)
+    medians = np.full(N_PARAMETERS, np.nan)
+    for index, column in enumerate(error.T):
+        known = column[np.isfinite(column)]
+        if len(known):
+            medians[index] = np.median(known)
+    return medians

@@ -1,0 +1,357 @@
+"""One HTML file that tells how good a clone is: readable without a network, on paper, in the light and in the dark."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from teamclone.dataset.reader import open_dataset
+from teamclone.errors import RunError
+from teamclone.evaluation import figures, paper
+from teamclone.evaluation.evaluate import evaluate, load_evaluation, model_id, save_evaluation, write_json
+from teamclone.evaluation.latency import load_bench, measure_latency
+from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.training.config import to_toml
+from teamclone.training.run import Run
+
+KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
+NOTHING = "\N{EN DASH}"
+SPLIT_NAMES = {
+    "train": "training matches of another dataset",
+    "validation": "validation matches",
+    "test": "test matches",
+    "unseen": "unseen opponents",
+}
+FIGURES = (
+    ("accuracy", "accuracy", "share of commands predicted right"),
+    ("cross_entropy", "cross-entropy, nats", "surprise at what was done; lower is better"),
+    ("brier", "Brier score", "squared error of the probabilities, 0 to 2; lower is better"),
+    ("ece", "calibration error", "gap between confidence and accuracy; lower is better"),
+    ("balanced_accuracy", "balanced accuracy", "mean recall of the commands"),
+    ("macro_f1", "macro F1", "mean F1 of the commands"),
+    ("paper_mae", "the paper's MAE", "mean absolute error of all six outputs, zeros included"),
+)
+PERCENT = {"accuracy", "balanced_accuracy", "ece"}
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """0.8455 as ``84.6 %``; what is undefined as a dash."""
+    return NOTHING if value is None else f"{100 * value:.{digits}f}\N{NARROW NO-BREAK SPACE}%"
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number with so many decimals, thousands grouped; what is undefined as a dash."""
+    return NOTHING if value is None else f"{value:,.{digits}f}"
+
+
+def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 3) -> Markup:
+    """A figure and, small beside it, its interval."""
+    if value is None or value["value"] is None:
+        return Markup(NOTHING)
+    write = percent if kind == "percent" else number
+    text = Markup("{}").format(write(value["value"], digits))
+    if value["low"] is None:
+        return text
+    low, high = write(value["low"], digits), write(value["high"], digits)
+    if kind == "percent":
+        low = low.removesuffix("\N{NARROW NO-BREAK SPACE}%")
+    return text + Markup(' <small class="interval">{} to {}</small>').format(low, high)
+
+
+def split_by_rows(evaluation: Mapping[str, Any]) -> bool:
+    """Whether rows of one match stand on both sides, as in the paper."""
+    return str((evaluation["dataset"]["options"] or {}).get("split")) == "rows"
+
+
+def primary_split(evaluation: Mapping[str, Any]) -> str:
+    """The split the headline speaks of: test, or the next best there is."""
+    there = evaluation["splits"]
+    return next(name for name in ("test", "unseen", "validation", "train") if name in there)
+
+
+def best_epoch(history: Sequence[Mapping[str, Any]]) -> int | None:
+    """The epoch of the lowest validation loss."""
+    known = [row for row in history if row.get("validation_loss") is not None]
+    return int(min(known, key=lambda row: row["validation_loss"])["epoch"]) if known else None
+
+
+def sentences(evaluation: Mapping[str, Any]) -> list[str]:
+    """What the numbers say, in words; every claim depends on them."""
+    name = primary_split(evaluation)
+    section = evaluation["splits"][name]
+    team, model, others = evaluation["dataset"]["team"], section["model"], section["baselines"]
+    n_matches = len(section["matches"])
+    where = {
+        "test": "it never saw",
+        "unseen": "against opponents it never saw",
+        "validation": "that only chose its checkpoint",
+        "train": "of another dataset",
+    }[name]
+    if split_by_rows(evaluation) and name != "unseen":
+        where = "whose neighbouring moments it was trained on (split by row, as in the paper)"
+    matches = f"{n_matches} match" + ("" if n_matches == 1 else "es")
+    text = (
+        f"In {matches} {where}, the clone names the next command of a {team} player right "
+        f"{percent(model['accuracy']['value'])} of the time"
+    )
+    if model["accuracy"]["low"] is not None:
+        low = percent(model["accuracy"]["low"]).removesuffix("\N{NARROW NO-BREAK SPACE}%")
+        text += f" (95 % interval {low} to {percent(model['accuracy']['high'])})"
+    said = [f"{text}."]
+
+    persistence, majority = others["persistence"], others["majority"]
+    said.append(
+        f"Repeating the player's last command would be right {percent(persistence['accuracy']['value'])} of the time, "
+        f"always saying the most frequent one {percent(majority['accuracy']['value'])}."
+    )
+    strongest = max(others.values(), key=lambda other: other["accuracy"]["value"] or 0.0)
+    gain = strongest["accuracy_gain"]
+    certain = gain["low"] if gain["low"] is not None else gain["value"]
+    if certain > 0:
+        said.append(f"That is {100 * gain['value']:.1f} points above the strongest rule without a network.")
+    elif gain["value"] > 0:
+        said.append("Whether that beats the strongest rule without a network is not certain: test on more matches.")
+    else:
+        said.append("That does not beat the strongest rule without a network: train longer or on more matches.")
+
+    unseen = evaluation["splits"].get("unseen")
+    if unseen is not None and name == "test":
+        names = listing([row["opponent"] for row in unseen["opponents"]])
+        difference = 100 * (unseen["model"]["accuracy"]["value"] - model["accuracy"]["value"])
+        how = (
+            "the same"
+            if abs(difference) < 0.05
+            else f"{abs(difference):.1f} points {'more' if difference > 0 else 'less'}"
+        )
+        said.append(
+            f"Against {names}, never met in training, it is right {percent(unseen['model']['accuracy']['value'])} "
+            f"of the time, {how}."
+        )
+    return said
+
+
+def listing(names: Sequence[str], most: int = 4) -> str:
+    """Some names in a sentence."""
+    if len(names) > most:
+        return f"{', '.join(names[:most])} and {len(names) - most} more"
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Accuracy of rules and clone, as bars from the bottom to the top."""
+    section = evaluation["splits"][primary_split(evaluation)]
+    names = {"majority": "most frequent command", "persistence": "repeat the last command", "markov": "Markov table"}
+    rows = [
+        {"name": names[key], "kind": "rule", **section["baselines"][key]["accuracy"]} for key in section["baselines"]
+    ]
+    rows.sort(key=lambda row: row["value"] or 0.0)
+    rows.append({"name": "this clone", "kind": "clone", **section["model"]["accuracy"]})
+    published = {"value": paper.PUBLISHED["accuracy"], "low": None, "high": None}
+    rows.append({"name": f"the paper's clone of {paper.TEAM}", "kind": "paper", **published})
+    return rows
+
+
+def calibration_sentence(section: Mapping[str, Any]) -> str:
+    """What the confidence means, at the most confident bin and at the least."""
+    curve = section["calibration"]["predicted_command"]
+    if not curve["said"]:
+        return ""
+    low, high = 0, len(curve["said"]) - 1
+    return (
+        f"When it is {percent(curve['said'][high], 0)} sure it is right {percent(curve['came_true'][high], 0)} of the "
+        f"time, and {percent(curve['came_true'][low], 0)} when it is {percent(curve['said'][low], 0)} sure."
+    )
+
+
+def commands(evaluation: Mapping[str, Any]) -> list[str]:
+    """The commands that lead from match logs to this report; what the record does not know stands in capitals."""
+    data, run = evaluation["dataset"], evaluation["run"]
+    options = data["options"] or {}
+    build = ["teamclone dataset --store STORE", f"--team {shlex.quote(data['team'])}"]
+    for key, value in options.items():
+        if key == "team" or value is None or value == []:
+            continue
+        name = {"test_matches": "test-match", "validation_matches": "validation-match"}.get(key, key.replace("_", "-"))
+        build += [f"--{name} {shlex.quote(str(item))}" for item in (value if isinstance(value, list) else [value])]
+    other = "" if data["own"] else f" --data {shlex.quote(data['path'])}"
+    path = shlex.quote(run["path"])
+    return [
+        "teamclone ingest MATCHES --store STORE",
+        " ".join([*build, f"--out {shlex.quote(data['path'])}"]),
+        f"teamclone train DATASET --out {path}  # with the settings below",
+        f"teamclone evaluate {path}{other} --checkpoint {run['checkpoint']}",
+        f"teamclone bench {path}",
+        f"teamclone report {path}",
+    ]
+
+
+def make_report(
+    run: Run,
+    *,
+    out: Path | None = None,
+    quick_predictions: int = 2000,
+    on_progress: Callable[[str, int, int], None] | None = None,
+) -> Path:
+    """Write the report of a run; what it needs and the run lacks is computed first.
+
+    RUN/evaluation.json is made if it is missing or belongs to other weights, RUN/bench.json likewise, with fewer
+    predictions than `teamclone bench` takes.
+
+    Args:
+        run: the run.
+        out: the file; None is RUN/report.html.
+        quick_predictions: how many single predictions are timed if none were.
+        on_progress: called with the name of the work, what is done and what there is in all.
+
+    Returns:
+        The file.
+    """
+
+    def telling(work: str) -> Callable[[int, int], None] | None:
+        return None if on_progress is None else lambda done, total: on_progress(work, done, total)
+
+    evaluation = fresh_evaluation(run) or evaluate(run, on_progress=telling("evaluate"))
+    save_evaluation(run, evaluation)
+    bench = fresh_bench(run, checkpoint=evaluation["run"]["checkpoint"])
+    if bench is None and quick_predictions:
+        dataset = open_dataset(evaluation["dataset"]["path"])
+        model = run.load_model(evaluation["run"]["checkpoint"])
+        bench = measure_latency(model, dataset, n=quick_predictions, on_progress=telling("response times"))
+        write_json(run.path / "bench.json", bench)
+    html = render(run, evaluation, bench, history=run.history())
+    path = out or run.path / "report.html"
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(html, encoding="utf-8")
+    part.replace(path)
+    return path
+
+
+def fresh_evaluation(run: Run) -> dict[str, Any] | None:
+    """The saved evaluation, if it speaks of the weights and the dataset that the run has now."""
+    try:
+        evaluation = load_evaluation(run.path / "evaluation.json")
+        weights = model_id(run.load_model(evaluation["run"]["checkpoint"]))
+    except (RunError, KeyError):
+        return None
+    fresh = weights == evaluation["run"]["model_id"] and evaluation["dataset"]["id"] == run.dataset_id
+    return evaluation if fresh else None
+
+
+def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
+    """The saved response times, if they are of these weights."""
+    try:
+        bench = load_bench(run.path / "bench.json")
+        return bench if bench["model_id"] == model_id(run.load_model(checkpoint)) else None
+    except (RunError, KeyError):
+        return None
+
+
+def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, history: Sequence[Any]) -> dict[str, Markup]:
+    """The figures by name; those without data are missing."""
+    data, splits = evaluation["data"], evaluation["splits"]
+    team = evaluation["dataset"]["team"]
+    totals = {kind: sum(counts[kind] for counts in data["commands_by_split"].values()) for kind in KINDS}
+    drawn: dict[str, Any] = {
+        "positions": (
+            figures.positions(data["positions"], totals),
+            f"Four pitches, one per command, with dots where players of {team} gave it",
+        ),
+        "frequencies": (
+            figures.frequencies(totals),
+            "Bars of commands by kind: " + ", ".join(f"{kind} {totals[kind]:,}" for kind in KINDS),
+        ),
+        "turn-moments": (
+            figures.turn_moments(
+                data["turn_moments"]["edges"],
+                data["turn_moments"]["counts"],
+                zero=data["turn_zero"],
+                turns=data["turns"],
+            ),
+            f"Histogram of turn moments in degrees; {data['turn_zero']:,} of {data['turns']:,} turns are zero",
+        ),
+        "reliability": (
+            figures.reliability(splits[primary_split(evaluation)]["calibration"]),
+            "Two reliability diagrams: share that came true against probability said; the diagonal is perfect",
+        ),
+    }
+    compared = {name: splits[name]["model"] for name in ("validation", "test", "unseen", "train") if name in splits}
+    if len(compared) > 1:
+        drawn["seen-unseen"] = (
+            figures.seen_unseen(compared),
+            "Accuracy, cross-entropy, calibration error and mean absolute error of each split with 95 % intervals",
+        )
+    rows = [{"split": name, **row} for name in compared for row in splits[name]["opponents"]]
+    if len(rows) > 1:
+        drawn["opponents"] = (
+            figures.opponents(rows),
+            "Accuracy by opponent with 95 % intervals, as in the table below",
+        )
+    if history:
+        drawn["training-curves"] = (
+            figures.training_curves(history, best_epoch=best_epoch(history)),
+            "Training and validation curves by epoch",
+        )
+    if bench is not None:
+        drawn["response-times"] = (
+            figures.response_times(
+                bench["histogram"]["edges_us"],
+                bench["histogram"]["counts"],
+                p50_us=bench["single"]["p50_us"],
+                p99_us=bench["single"]["p99_us"],
+            ),
+            f"Histogram of response times, half of them below {bench['single']['p50_us']:.0f} microseconds",
+        )
+    return {name: Markup(figures.svg(drawing, name=name, alt=alt)) for name, (drawing, alt) in drawn.items()}
+
+
+def render(
+    run: Run, evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, *, history: Sequence[Mapping[str, Any]]
+) -> str:
+    """The report as HTML.
+
+    Args:
+        run: the run; its settings are shown.
+        evaluation: from `evaluate.evaluate`.
+        bench: from `latency.measure_latency`; None leaves the response times out.
+        history: from ``run.history()``; empty leaves the training curves out.
+    """
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"percent": percent, "number": number, "figure": figure}
+    template = environment.from_string(resources.files(__package__).joinpath("report.html.j2").read_text("utf-8"))
+    name = primary_split(evaluation)
+    section = evaluation["splits"][name]
+    support = [sum(row) for row in section["confusion"]]
+    return template.render(
+        evaluation=evaluation,
+        run=run,
+        bench=bench,
+        history=history,
+        best_epoch=best_epoch(history),
+        primary=name,
+        section=section,
+        splits=evaluation["splits"],
+        split_names=SPLIT_NAMES,
+        figures=FIGURES,
+        percents=PERCENT,
+        kinds=KINDS,
+        support=support,
+        sentences=sentences(evaluation),
+        ladder=ladder(evaluation),
+        calibration=calibration_sentence(section),
+        cleaning=evaluation["dataset"]["cleaning"] or {},
+        by_rows=split_by_rows(evaluation),
+        commands=commands(evaluation),
+        paper=paper,
+        plots=_plots(evaluation, bench, history),
+        settings=to_toml(run.config),
+        versions={**run.environment, **evaluation["versions"]},
+        listing=listing,
+    )

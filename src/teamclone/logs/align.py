@@ -1,0 +1,79 @@
+"""Binding commands to frames: a command stamped (t, k) was decided on frame (t, k) and shows its effect in the next.
+
+Frames and commands are matched by the pair of time and stoppage counter, since the time alone repeats while the
+clock is stopped. Commands of cycle 0, of half time and behind the last frame have no frame.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.logs.columns import counter_name
+from teamclone.logs.match import N_PLAYERS, Columns
+from teamclone.rcss.commands import BODY_KINDS, CommandKind
+
+_STOPPAGES = 1 << 20
+
+
+def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, has_stoppage: bool) -> NDArray[np.int32]:
+    """Index of the frame of each (cycle, stoppage), shape of ``cycle``; -1 where there is none.
+
+    Without stoppage counters (servers 12.x) a stamp inside a stoppage cannot be told from its neighbours: -1.
+    """
+    keys = frames["cycle"].astype(np.int64) * _STOPPAGES + frames["stoppage"]
+    wanted = cycle.astype(np.int64) * _STOPPAGES + stoppage
+    if not len(keys):
+        return np.full(len(wanted), -1, np.int32)
+    by_key = np.argsort(keys, kind="stable")
+    place = np.minimum(np.searchsorted(keys[by_key], wanted), len(keys) - 1)
+    found = by_key[place]
+    bound = np.where(keys[found] == wanted, found, -1).astype(np.int32)
+    if not has_stoppage:
+        cycles, counts = np.unique(frames["cycle"], return_counts=True)
+        bound[np.isin(cycle, cycles[counts > 1])] = -1
+    return bound
+
+
+def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
+    """Place on the player axis: 0..10 the left team's numbers 1..11, 11..21 the right team's; -1 for a coach."""
+    return np.where((unum > 0) & (side != 0), unum.astype(np.int64) - 1 + np.where(side < 0, 11, 0), -1)
+
+
+def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
+    """Indices of the commands that take the body slot: the first of each frame and player (rcss.md 3.2).
+
+    A ``move`` during play_on leaves the slot free, an invalid command never takes it.
+
+    Args:
+        commands: with ``frame``, ``side``, ``unum``, ``kind``, ``valid``, in log order.
+        playmode: (n_frames,) of the match.
+        play_on: id of the play mode in which ``move`` is not allowed.
+    """
+    body = np.isin(commands["kind"], BODY_KINDS) & commands["valid"] & (commands["frame"] >= 0) & (commands["unum"] > 0)
+    index = np.flatnonzero(body)
+    mode = playmode[commands["frame"][index]]
+    index = index[~((commands["kind"][index] == CommandKind.MOVE) & (mode == play_on))]
+    slot = slot_of(commands["side"][index], commands["unum"][index])
+    key = commands["frame"][index].astype(np.int64) * N_PLAYERS + slot
+    _, first = np.unique(key, return_index=True)  # the first of equal keys, in log order
+    return index[first]
+
+
+def executed_kind(players: Columns) -> NDArray[np.uint8]:
+    """The body command that the server executed on each frame, by the counters of the next one.
+
+    Returns:
+        (n_frames, 22) CommandKind ids, 0 for none; the last frame has none. Where a kick and a two-leg dash were both
+        executed the kick is named.
+    """
+    n_frames = len(players["state"])
+    kinds = np.zeros((n_frames, N_PLAYERS), np.uint8)
+    # Written last wins: kick goes above dash.
+    for kind in sorted(BODY_KINDS, key=lambda kind: kind is CommandKind.KICK):
+        counter = players[counter_name(kind)]
+        rose = (counter[1:] > counter[:-1]) & (counter[:-1] >= 0)
+        kinds[:-1][rose] = kind
+    return kinds

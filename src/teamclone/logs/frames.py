@@ -1,0 +1,106 @@
+"""What every reader of game logs does alike: stoppage counter, play modes and scores by frame, teams, player types.
+
+A log states the play mode and the teams only when they change, before the first frame they hold for. Readers collect
+these statements as *marks*, each with the index of the frame that follows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.logs import columns
+from teamclone.logs.match import Columns, Team, default_player_types, empty_columns
+
+SCORES = tuple(column.name for column in columns.FRAMES if column.name.startswith(("left_", "right_")))
+"""Columns of the scores in the order of a text log's ``(team ...)`` line and of ``TeamMark.scores``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeamMark:
+    """Names and scores from frame ``frame`` on. ``scores`` stand in the order of ``SCORES``."""
+
+    frame: int
+    left: str | None
+    right: str | None
+    scores: tuple[int, int, int, int, int, int]
+
+
+def stoppage_of(cycle: NDArray[np.int32]) -> NDArray[np.int32]:
+    """How often each cycle was seen just before: ``[7 7 7 8]`` gives ``[0 1 2 0]``. Shape (n_frames,).
+
+    Text and binary logs do not write the stoppage counter, but show the frames of a stopped clock one by one.
+    """
+    index = np.arange(len(cycle), dtype=np.int32)
+    first = np.zeros(len(cycle), np.int32)
+    changed = np.flatnonzero(cycle[1:] != cycle[:-1]) + 1
+    first[changed] = changed
+    stoppage: NDArray[np.int32] = index - np.maximum.accumulate(first)
+    return stoppage
+
+
+def fill_marks(n_frames: int, marks: Sequence[tuple[int, tuple[int, ...]]], width: int) -> NDArray[np.int64]:
+    """Values of each frame, shape (n_frames, width): those of the last mark at or before it, zeros before the first.
+
+    Args:
+        marks: (frame index, ``width`` values), by ascending frame. Marks after the last frame change nothing.
+    """
+    values = np.zeros((len(marks) + 1, width), np.int64)
+    for row, (_, mark) in enumerate(marks, start=1):
+        values[row] = mark
+    starts = np.array([frame for frame, _ in marks], np.int64)
+    filled: NDArray[np.int64] = values[np.searchsorted(starts, np.arange(n_frames), side="right")]
+    return filled
+
+
+def frame_columns(
+    *,
+    cycle: NDArray[np.int32],
+    ball: NDArray[np.floating],
+    modes: Sequence[tuple[int, int]],
+    teams: Sequence[TeamMark],
+    stoppage: NDArray[np.int32] | None = None,
+) -> Columns:
+    """The columns ``columns.FRAMES``.
+
+    Args:
+        cycle: shape (n_frames,).
+        ball: x, y in metres and vx, vy in metres per cycle, shape (n_frames, 4); or x, y alone, shape (n_frames, 2).
+        modes: (frame index, play mode id), by ascending frame.
+        teams: by ascending frame.
+        stoppage: shape (n_frames,); None counts the repetitions of the cycle.
+    """
+    n_frames = len(cycle)
+    made = empty_columns(columns.FRAMES, n_frames)
+    made["cycle"][:] = cycle
+    made["stoppage"][:] = stoppage_of(cycle) if stoppage is None else stoppage
+    made["playmode"][:] = fill_marks(n_frames, [(frame, (mode,)) for frame, mode in modes], 1)[:, 0]
+    scores = fill_marks(n_frames, [(mark.frame, mark.scores) for mark in teams], len(SCORES))
+    for index, name in enumerate(SCORES):
+        made[name][:] = scores[:, index]
+    for index, name in enumerate(("ball_x", "ball_y", "ball_vx", "ball_vy")[: ball.shape[1]]):
+        made[name][:] = ball[:, index]
+    return made
+
+
+def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:
+    """Left and right team with the last score of the log. A name once stated stays, whatever later marks leave out."""
+    left = next((mark.left for mark in reversed(marks) if mark.left is not None), None)
+    right = next((mark.right for mark in reversed(marks) if mark.right is not None), None)
+    last = marks[-1].scores if marks else (0, 0, 0, 0, 0, 0)
+    return (
+        Team(name=left, score=last[0], penalties_scored=last[2], penalties_missed=last[3]),
+        Team(name=right, score=last[1], penalties_scored=last[4], penalties_missed=last[5]),
+    )
+
+
+def player_type_columns(types: Mapping[int, Mapping[str, float | str]]) -> Columns:
+    """The columns of ``player_types.FIELDS``, row = type id; what a log leaves out gets the server's default."""
+    made = default_player_types(max(types, default=-1) + 1)
+    for row, fields in types.items():
+        for name in made.keys() & fields.keys():
+            made[name][row] = float(fields[name])
+    return made

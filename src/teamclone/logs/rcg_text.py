@@ -1,0 +1,227 @@
+"""Game logs as text: versions 4, 5 and 6."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.errors import LogError
+from teamclone.logs import scan
+from teamclone.logs.columns import COUNTERS, PLAYERS, counter_name
+from teamclone.logs.frames import TeamMark, final_teams, frame_columns, player_type_columns
+from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
+from teamclone.rcss.playmodes import BY_NAME
+
+_PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')
+_TEAM = re.compile(rb"\(team (\d+) (\S+) (\S+) (-?\d+) (-?\d+)(?: (\d+) (\d+) (\d+) (\d+))?\)\s*$")
+_PLAYMODE = re.compile(rb"\(playmode (\d+) (\w+)\)\s*$")
+_MAX_TYPES = 256
+_MAX_SCORE = 32767
+
+_WHAT = {
+    scan.BAD_NUMBER: "a number is expected",
+    scan.BAD_STRUCTURE: "the line is cut off or is no show record",
+    scan.WRONG_PLAYERS: "the show has not each of the 22 players",
+}
+
+
+def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
+    """Reads a text game log.
+
+    Args:
+        data: the decompressed log; begins with ``ULG4``, ``ULG5`` or ``ULG6``.
+        path: its name, for messages.
+
+    Raises:
+        LogError: there is not one good frame.
+    """
+    buffer = np.frombuffer(data, np.uint8)
+    starts, stops = line_bounds(buffer)
+    shows = np.flatnonzero(_begins(buffer, starts, stops, b"(show "))
+    problems: list[Problem] = []
+    frames, players, good = _scan(buffer, starts[shows], stops[shows], shows, problems, path=path)
+    frame_of_line = np.cumsum(good)
+    modes: list[tuple[int, int]] = []
+    teams: list[TeamMark] = []
+    server_params: dict[str, float | str] = {}
+    player_params: dict[str, float | str] = {}
+    types: dict[int, dict[str, float | str]] = {}
+    finished = False
+    odd: list[int] = []
+    for index in np.setdiff1d(np.arange(1, len(starts)), shows, assume_unique=True):
+        line = data[starts[index] : stops[index]]
+        shows_before = int(np.searchsorted(shows, index))
+        frame = int(frame_of_line[shows_before - 1]) if shows_before else 0
+        if match := _PLAYMODE.match(line):
+            mode = BY_NAME.get(match[2].decode())
+            if mode is None:
+                problems.append(
+                    Problem(
+                        code="unknown-playmode",
+                        severity=Severity.WARNING,
+                        text=f"play mode {match[2].decode()!r} is unknown, kept as 0",
+                        path=path,
+                        line=int(index) + 1,
+                        cycle=int(match[1]),
+                    )
+                )
+            modes.append((frame, int(mode or 0)))
+        elif match := _TEAM.match(line):
+            left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
+            scores = [min(int(value or 0), _MAX_SCORE) for value in match.groups()[3:]]
+            teams.append(
+                TeamMark(
+                    frame=frame,
+                    left=left,
+                    right=right,
+                    scores=(scores[0], scores[1], scores[2], scores[3], scores[4], scores[5]),
+                )
+            )
+        elif line.startswith(b"(msg "):
+            finished = finished or b'"(result ' in line
+        elif line.startswith(b"(server_param "):
+            server_params = parameters(line)
+        elif line.startswith(b"(player_param "):
+            player_params = parameters(line)
+        elif line.startswith(b"(player_type "):
+            values = parameters(line)
+            number = values.get("id", -1.0)
+            if isinstance(number, float) and 0 <= number < _MAX_TYPES:
+                types[int(number)] = values
+            else:
+                odd.append(int(index))
+        elif line.strip():
+            odd.append(int(index))
+    if odd:
+        problems.append(
+            Problem(
+                code="odd-line",
+                severity=Severity.WARNING,
+                text=f"{len(odd)} line(s) are no known record, the first is {data[starts[odd[0]] : stops[odd[0]]][:40]!r}",
+                path=path,
+                line=odd[0] + 1,
+            )
+        )
+    left_team, right_team = final_teams(teams)
+    return GameLog(
+        log_version=data[3:4].decode(),
+        left=left_team,
+        right=right_team,
+        frames=frame_columns(cycle=frames["cycle"], ball=frames["ball"], modes=modes, teams=teams),
+        players=players,
+        player_types=player_type_columns(types),
+        server_params=server_params,
+        player_params=player_params,
+        complete=finished,
+        problems=tuple(problems),
+    )
+
+
+def parameters(line: bytes) -> dict[str, float | str]:
+    """Names and values of ``(server_param (name value)(name value)...)``; true and false become 1 and 0."""
+    values: dict[str, float | str] = {}
+    for name, text, bare in _PARAMETER.findall(line):
+        if bare in {b"true", b"false"}:
+            values[name.decode()] = float(bare == b"true")
+            continue
+        try:
+            values[name.decode()] = float(bare) if bare else text.decode("utf-8", "replace")
+        except ValueError:
+            values[name.decode()] = bare.decode("utf-8", "replace")
+    return values
+
+
+def line_bounds(buffer: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each line begins and ends (without its newline), shapes (n_lines,)."""
+    newlines = np.flatnonzero(buffer == 10).astype(np.int64)
+    starts = np.concatenate(([0], newlines + 1))
+    stops = np.concatenate((newlines, [len(buffer)]))
+    if starts[-1] == len(buffer):
+        return starts[:-1], stops[:-1]
+    return starts, stops
+
+
+def _begins(
+    buffer: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64], word: bytes
+) -> NDArray[np.bool_]:
+    begins = stops - starts >= len(word)
+    places = starts[begins]
+    same = np.ones(len(places), np.bool_)
+    for offset, byte in enumerate(word):
+        same &= buffer[places + offset] == byte
+    begins[begins] = same
+    return begins
+
+
+def _scan(
+    buffer: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    stops: NDArray[np.int64],
+    lines: NDArray[np.int64],
+    problems: list[Problem],
+    *,
+    path: Path | None,
+) -> tuple[Columns, Columns, NDArray[np.bool_]]:
+    """Frames of the show lines: cycle and ball, player columns, and which lines were good."""
+    n = len(starts)
+    cycles = np.zeros(n, np.int32)
+    ball = np.zeros((4, n), np.float32)
+    floats = np.full((len(scan.PLAYER_FLOATS), n, N_PLAYERS), np.nan, np.float32)
+    counters = np.full((len(COUNTERS), n, N_PLAYERS), -1, np.int32)
+    players = empty_columns(PLAYERS, 0)
+    whole = {
+        name: np.full((n, N_PLAYERS), 255 if name == "view_quality" else 0, players[name].dtype)
+        for name in ("type", "state", "view_quality", "attention_side", "attention_unum")
+    }
+    outcomes = np.zeros(n, np.uint8)
+    places = np.zeros(n, np.int64)
+    n_good = scan.scan_shows(
+        buffer,
+        starts,
+        stops,
+        cycles,
+        ball,
+        floats,
+        whole["type"],
+        whole["state"],
+        whole["view_quality"],
+        whole["attention_side"],
+        whole["attention_unum"],
+        counters,
+        outcomes,
+        places,
+    )
+    good = outcomes == scan.OK
+    if n_good < n:
+        bad = np.flatnonzero(~good)
+        first = int(bad[0])
+        last_line = bool(len(bad) == 1 and first == n - 1 and stops[first] == len(buffer))
+        text = _WHAT[int(outcomes[first])]
+        problems.append(
+            Problem(
+                code="truncated" if last_line else "bad-show",
+                severity=Severity.WARNING,
+                text=f"{text}; the last frame is left out"
+                if last_line
+                else f"{text}; {len(bad)} of {n} frames are left out",
+                path=path,
+                line=int(lines[first]) + 1,
+                byte=int(places[first]),
+                cycle=int(cycles[first]) if cycles[first] >= 0 else None,
+            )
+        )
+    if not n_good:
+        raise LogError(
+            "holds no frame: expected lines '(show ...)' behind the header" if n == 0 else str(problems[-1].text),
+            path=path,
+            line=int(lines[0]) + 1 if n else None,
+        )
+    keep = slice(None) if n_good == n else good
+    players = {name: floats[index, keep] for index, name in enumerate(scan.PLAYER_FLOATS)}
+    players |= {name: values[keep] for name, values in whole.items()}
+    players |= {counter_name(kind): counters[index, keep] for index, kind in enumerate(COUNTERS)}
+    ordered = {column.name: players[column.name] for column in PLAYERS}
+    return {"cycle": cycles[keep], "ball": ball[:, keep].T}, ordered, good

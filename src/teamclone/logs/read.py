@@ -1,0 +1,352 @@
+"""``read_match``: one match from its files, whatever their format."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from teamclone.errors import LogError, UsageError
+from teamclone.logs.align import executed_kind, first_body_commands, frame_of, slot_of
+from teamclone.logs.columns import FRAMES, PLAYERS
+from teamclone.logs.match import (
+    N_PLAYERS,
+    CommandLog,
+    GameLog,
+    Match,
+    Problem,
+    Severity,
+    Team,
+    default_player_types,
+    empty_columns,
+)
+from teamclone.logs.open import read_bytes
+from teamclone.logs.rcg_binary import read_binary
+from teamclone.logs.rcg_json import read_json
+from teamclone.logs.rcg_text import read_text
+from teamclone.logs.rcl import FIRST_LINE, read_commands, sender_names
+from teamclone.rcss import state_bits
+from teamclone.rcss.playmodes import PlayMode
+
+_LOG_NAME = re.compile(r"(?P<stem>.+)\.(?P<kind>rcg|rcl)(?P<packing>\.(?:gz|xz|zst))?$", re.IGNORECASE)
+_FEWEST_EXECUTED = 0.5
+"""Below this share of executed body commands in play_on a command log belongs to another match (measured: 99.7 %)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogPair:
+    """The files of one match; one of them may be missing."""
+
+    rcg: Path | None
+    rcl: Path | None
+
+    @property
+    def path(self) -> Path:
+        """The file that names the match."""
+        path = self.rcg or self.rcl
+        if path is None:
+            raise ValueError("a pair of logs needs at least one file")
+        return path
+
+
+def find_matches(paths: Iterable[Path]) -> list[LogPair]:
+    """The matches in files and folders (searched recursively), each once, ordered by path.
+
+    Files are paired by name: ``x.rcg.gz`` goes with ``x.rcl`` in any packing. A file named on its own is taken
+    whatever it is called.
+
+    Raises:
+        UsageError: a path does not exist, or there is no log under any of them.
+    """
+    found: dict[tuple[Path, str], dict[str, Path]] = {}
+    given = list(paths)
+    for path in given:
+        if path.is_dir():
+            files = sorted(file for file in path.rglob("*") if _LOG_NAME.match(file.name) and file.is_file())
+        elif path.exists():
+            files = [path]
+        else:
+            raise UsageError(f"{path}: no such file or folder")
+        for file in files:
+            match = _LOG_NAME.match(file.name)
+            if match is None:
+                found.setdefault((file.parent, file.name), {})["rcg"] = file
+                continue
+            kind = match["kind"].lower()
+            pair = found.setdefault((file.parent, match["stem"]), {})
+            pair.setdefault(kind, file)
+            partner = partner_of(file)
+            if partner is not None:
+                pair.setdefault("rcl" if kind == "rcg" else "rcg", partner)
+    if not found:
+        raise UsageError(f"no .rcg or .rcl file under {', '.join(map(str, given)) or 'no path'}")
+    return [LogPair(rcg=pair.get("rcg"), rcl=pair.get("rcl")) for _, pair in sorted(found.items())]
+
+
+def partner_of(path: Path) -> Path | None:
+    """The other log of the same match beside ``path``, by name; None where there is none."""
+    match = _LOG_NAME.match(path.name)
+    if match is None:
+        return None
+    other = "rcl" if match["kind"].lower() == "rcg" else "rcg"
+    for packing in dict.fromkeys((match["packing"] or "", "", ".gz", ".xz", ".zst")):
+        candidate = path.with_name(f"{match['stem']}.{other}{packing}")
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+def read_match(source: str | os.PathLike[str] | BinaryIO, *, partner: str | os.PathLike[str] | None = None) -> Match:
+    """Reads a match.
+
+    Args:
+        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz or zst. What it is
+            is told by its content.
+        partner: the other log. None looks for a file of the same name beside ``source``.
+
+    Raises:
+        LogError: nothing can be read from the source.
+    """
+    if isinstance(source, str | os.PathLike):
+        path = Path(source)
+        data, broken = read_bytes(path)
+        other = Path(partner) if partner is not None else partner_of(path)
+    else:
+        path = None
+        data, broken = read_bytes(source)
+        other = None if partner is None else Path(partner)
+    first = _Source(path=path, data=data, broken=broken)
+    second = None
+    problems: list[Problem] = []
+    if other is not None:
+        try:
+            second = _Source(path=other, data=(content := read_bytes(other))[0], broken=content[1])
+        except LogError as error:
+            problems.append(_problem_of(error, other))
+    return _bind(first, second, problems)
+
+
+def read_pair(pair: LogPair) -> Match:
+    """Reads the match of a pair of files; a bad command log costs the commands, a bad game log the match.
+
+    Raises:
+        LogError: nothing can be read.
+    """
+    return read_match(pair.path, partner=pair.rcl if pair.rcg is not None else None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Source:
+    path: Path | None
+    data: bytes
+    broken: str | None
+
+    @property
+    def is_commands(self) -> bool:
+        return FIRST_LINE.match(self.data) is not None
+
+
+def _problem_of(error: LogError, path: Path | None) -> Problem:
+    return Problem(
+        code="unreadable",
+        severity=Severity.ERROR,
+        text=error.text,
+        path=path,
+        line=error.line,
+        byte=error.byte,
+        cycle=error.cycle,
+    )
+
+
+def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Match:
+    rcg, rcl = (second, first) if first.is_commands else (first, second)
+    if second is not None and first.is_commands == second.is_commands:
+        kind = "command" if first.is_commands else "game"
+        problems.append(
+            Problem(
+                code="mismatched",
+                severity=Severity.ERROR,
+                text=f"is a {kind} log like {first.path}, expected its partner; left out",
+                path=second.path,
+            )
+        )
+        rcg, rcl = (None, first) if first.is_commands else (first, None)
+    game = None
+    if rcg is not None:
+        try:
+            game = read_game(rcg.data, path=rcg.path)
+        except LogError as error:
+            if rcl is None or rcg is first:
+                raise
+            problems.append(_problem_of(error, rcg.path))
+            rcg = None
+    if game is None:
+        if rcl is None:
+            raise LogError("holds neither a game log nor a command log", path=first.path)
+        game = _game_of_commands(rcl.data)
+        problems.append(
+            Problem(
+                code="no-game-log",
+                severity=Severity.ERROR,
+                text="no game log (.rcg) beside it: commands only, no frames",
+                path=rcl.path,
+            )
+        )
+    for source in (rcg, rcl):
+        if source is not None and source.broken is not None:
+            problems.append(
+                Problem(
+                    code="truncated",
+                    severity=Severity.WARNING,
+                    text=f"{source.broken}; kept what could be read",
+                    path=source.path,
+                    byte=len(source.data),
+                )
+            )
+    log = None
+    if rcl is not None:
+        log = _read_log(rcl, game, problems)
+    elif rcg is not None and not problems:
+        problems.append(
+            Problem(
+                code="no-command-log",
+                severity=Severity.NOTE,
+                text="no command log (.rcl) beside it: frames only",
+                path=rcg.path,
+            )
+        )
+    named = rcg or rcl
+    if named is None:
+        raise AssertionError("a match has a game log or a command log")
+    own = tuple(problems) + game.problems + (log.problems if log else ()) + tuple(_oddities(game, rcg))
+    return Match(
+        match_id=hashlib.blake2b(named.data, digest_size=8).hexdigest(),
+        rcg_path=rcg.path if rcg else None,
+        rcl_path=rcl.path if rcl and log else None,
+        game=game,
+        log=log,
+        problems=own,
+    )
+
+
+def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
+    """Reads a game log of any version from its decompressed bytes; the version is told by its first bytes.
+
+    Raises:
+        LogError: it is no game log, or holds no frame.
+    """
+    if data.startswith((b"ULG4", b"ULG5", b"ULG6")):
+        second = data[data.find(b"\n") + 1 :][:16].lstrip()
+        if data.startswith(b"ULG6") and second.startswith(b"["):
+            return read_json(data, path=path)
+        return read_text(data, path=path)
+    if data.startswith(b"JSON") or data[:64].lstrip().startswith(b"["):
+        return read_json(data, path=path)
+    if data.startswith((b"ULG\x02", b"ULG\x03", b"\x00")):
+        return read_binary(data, path=path)
+    raise LogError(
+        f"is no game log (.rcg) of version 1 to 6 or JSON and no command log (.rcl): begins with {data[:8]!r}",
+        path=path,
+    )
+
+
+def _game_of_commands(data: bytes) -> GameLog:
+    """The little a command log says of the match: the names, in the order of connection."""
+    names: list[str | None] = [*sender_names(data)[:2], None, None]
+    return GameLog(
+        log_version="none",
+        left=Team(name=names[0], score=0),
+        right=Team(name=names[1], score=0),
+        frames=empty_columns(FRAMES, 0),
+        players=empty_columns(PLAYERS, 0, N_PLAYERS),
+        player_types=default_player_types(0),
+        server_params={},
+        player_params={},
+        complete=False,
+    )
+
+
+def _read_log(rcl: _Source, game: GameLog, problems: list[Problem]) -> CommandLog | None:
+    try:
+        log = read_commands(rcl.data, left=game.left.name, right=game.right.name, path=rcl.path)
+    except LogError as error:
+        problems.append(_problem_of(error, rcl.path))
+        return None
+    frame = frame_of(game.frames, log.commands["cycle"], log.commands["stoppage"], has_stoppage=log.has_stoppage)
+    log = replace(log, commands=log.commands | {"frame": frame})
+    teams = {name for name in (game.left.name, game.right.name) if name}
+    senders = set(sender_names(rcl.data))
+    if len(game.frames["cycle"]) and ((senders and not senders & teams) or _foreign(game, log)):
+        text = (
+            f"is the command log of another match (teams {', '.join(sorted(senders)) or 'unknown'}, "
+            f"expected {', '.join(sorted(teams)) or 'none'}); left out"
+        )
+        problems.append(Problem(code="mismatched", severity=Severity.ERROR, text=text, path=rcl.path))
+        return None
+    return log
+
+
+def _foreign(game: GameLog, log: CommandLog) -> bool:
+    """Whether the server executed hardly any of the logged commands, so that the logs are of two matches."""
+    commands = log.commands
+    index = first_body_commands(commands, game.frames["playmode"], play_on=PlayMode.PLAY_ON)
+    frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
+    kind = executed_kind(game.players)
+    counted = (
+        (game.frames["playmode"][frame] == PlayMode.PLAY_ON)
+        & (frame < len(kind) - 1)
+        & (game.players["count_dash"][frame, slot] >= 0)
+        & (game.players["state"][frame, slot] != 0)
+    )
+    if counted.sum() < N_PLAYERS:
+        return False
+    same = kind[frame, slot][counted] == commands["kind"][index][counted]
+    return bool(same.mean() < _FEWEST_EXECUTED)
+
+
+def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:
+    """What is odd about the match itself: an unfinished log, absent teams, players who left."""
+    if source is None:
+        return []
+    path = source.path
+    problems = []
+    if not game.complete:
+        last = game.frames["cycle"][-1]
+        problems.append(
+            Problem(
+                code="incomplete",
+                severity=Severity.WARNING,
+                text=f"the log was not closed by the server; it ends at cycle {last}",
+                path=path,
+                cycle=int(last),
+            )
+        )
+    state = game.players["state"]
+    on_field = (state & state_bits.STAND) != 0
+    for side, team, slots in (("left", game.left, slice(0, 11)), ("right", game.right, slice(11, 22))):
+        if team.name is None or not on_field[:, slots].any():
+            problems.append(
+                Problem(code="no-team", severity=Severity.WARNING, text=f"no {side} team connected", path=path)
+            )
+            continue
+        left_field = on_field[:-1, slots] & ~on_field[1:, slots] & ((state[1:, slots] & state_bits.RED_CARD) == 0)
+        gone = np.flatnonzero(left_field.any(axis=0))
+        if len(gone):
+            frame = int(np.flatnonzero(left_field.any(axis=1))[0]) + 1
+            problems.append(
+                Problem(
+                    code="disconnected",
+                    severity=Severity.WARNING,
+                    text=f"{len(gone)} player(s) of {team.name} left the field: "
+                    + ", ".join(str(unum + 1) for unum in gone),
+                    path=path,
+                    cycle=int(game.frames["cycle"][frame]),
+                )
+            )
+    return problems

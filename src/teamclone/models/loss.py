@@ -1,0 +1,58 @@
+"""The paper's training error, and the targets in the form that it compares."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from teamclone.models.state import Target
+from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+
+ParameterLoss = Literal["paper", "masked"]
+
+LIMITS = torch.tensor([parameter.limit for parameter in PARAMETERS])
+"""(6,) in power and degrees: projects PARAMETERS onto [-1, 1]."""
+_ARGUMENT = torch.tensor([parameter.argument for parameter in PARAMETERS])
+_KIND = torch.tensor([CLONED_KINDS.index(parameter.kind) for parameter in PARAMETERS])
+
+
+class Loss(NamedTuple):
+    """The training error and its two parts, scalars: ``total = cross_entropy + parameter_mse``."""
+
+    total: Tensor
+    cross_entropy: Tensor
+    parameter_mse: Tensor
+
+
+def issued(kind: Tensor) -> Tensor:
+    """(batch, 6) bool: which of PARAMETERS belong to the command; ``kind`` is (batch,), index into CLONED_KINDS."""
+    return _KIND.to(kind.device) == kind[:, None]
+
+
+def projected_parameters(target: Target) -> Tensor:
+    """(batch, 6) in [-1, 1]: PARAMETERS of the command given, zero for those of other commands (Table II)."""
+    values = target.parameters[:, _ARGUMENT.to(target.kind.device)] / LIMITS.to(target.kind.device)
+    return torch.where(issued(target.kind), values, 0.0)
+
+
+def clone_loss(logits: Tensor, projected: Tensor, target: Target, *, parameter_loss: ParameterLoss = "paper") -> Loss:
+    """Cross-entropy plus mean squared error, unweighted (section II-B of the paper).
+
+    Args:
+        logits: (batch, 4).
+        projected: (batch, 6) predicted parameters in [-1, 1].
+        target: what the players did.
+        parameter_loss: "paper" takes the error over all six outputs, whose target is zero where the parameter was not
+            issued; "masked" only over the issued ones.
+    """
+    cross_entropy = functional.cross_entropy(logits, target.kind)
+    squared = (projected - projected_parameters(target)).square()
+    if parameter_loss == "masked":
+        mask = issued(target.kind)
+        mse = (squared * mask).sum() / mask.sum()
+    else:
+        mse = squared.mean()
+    return Loss(cross_entropy + mse, cross_entropy, mse)

@@ -1,0 +1,351 @@
+"""The tables of a store: columns, types, units, meanings. What the logs define comes from ``logs.columns``.
+
+Numbers that the logs hold unsigned are signed and wider in SQL, so that a difference of two columns cannot overflow and
+every SQL server has the type. A value that the log does not hold (NaN) is NULL.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from teamclone.errors import UsageError
+from teamclone.logs import columns
+from teamclone.logs.columns import Column
+from teamclone.rcss import player_types
+from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.playmodes import PlayMode
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+FORMAT = 1
+"""Raised whenever a reader of the old tables would misread the new ones."""
+
+SIGNED = {"uint8": "int16", "uint16": "int32", "uint32": "int64"}
+"""NumPy's unsigned types and the type that holds them in SQL."""
+
+SQL_NAMES = {
+    "bool": "boolean",
+    "int8": "tinyint",
+    "int16": "smallint",
+    "int32": "integer",
+    "int64": "bigint",
+    "float32": "real",
+    "float64": "double",
+    "string": "varchar",
+    "timestamp": "timestamp",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """One column of a table.
+
+    Attributes:
+        dtype: the stored type, a key of ``SQL_NAMES``.
+        numpy: the NumPy type in which the store returns it, as in ``Match``.
+    """
+
+    name: str
+    dtype: str
+    numpy: str
+    unit: str
+    about: str
+
+    @property
+    def sql_type(self) -> str:
+        return SQL_NAMES[self.dtype]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """One table: ``key`` names the columns that identify a row; ``rows`` are given where they are fixed."""
+
+    name: str
+    about: str
+    key: tuple[str, ...]
+    fields: tuple[Field, ...]
+    rows: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(field.name for field in self.fields)
+
+    def select(self, names: Sequence[str] | None) -> tuple[Field, ...]:
+        """The fields of these names, in their order; None for all.
+
+        Raises:
+            UsageError: a name is no column of this table.
+        """
+        if names is None:
+            return self.fields
+        by_name = {field.name: field for field in self.fields}
+        for name in names:
+            if name not in by_name:
+                raise UsageError(unknown("column", name, self.names, where=f"table {self.name}"))
+        return tuple(by_name[name] for name in names)
+
+
+def unknown(what: str, name: str, known: tuple[str, ...], *, where: str) -> str:
+    """The text of an error about a name that does not exist, with near matches."""
+    import difflib
+
+    near = difflib.get_close_matches(name, known, n=3)
+    hint = f"; did you mean {' or '.join(near)}?" if near else f"; it has {', '.join(known)}"
+    return f"{where} has no {what} {name!r}{hint}"
+
+
+def _field(name: str, dtype: str, unit: str, about: str) -> Field:
+    return Field(name=name, dtype=dtype, numpy=dtype, unit=unit, about=about)
+
+
+def _logged(specs: tuple[Column, ...]) -> tuple[Field, ...]:
+    return tuple(
+        Field(
+            name=spec.name,
+            dtype=SIGNED.get(spec.dtype, spec.dtype),
+            numpy=spec.dtype,
+            unit=spec.unit,
+            about=spec.about,
+        )
+        for spec in specs
+    )
+
+
+MATCH_ID = _field("match_id", "string", "", "the match: 16 hex digits, a hash of its game log")
+
+MATCHES = Table(
+    name="matches",
+    about="One row a match.",
+    key=("match_id",),
+    fields=(
+        MATCH_ID,
+        _field(
+            "started_at", "timestamp", "", "local time of the server's start, from the file name; NULL if it has none"
+        ),
+        _field("left_name", "string", "", "name of the left team; NULL where none connected"),
+        _field("right_name", "string", "", "name of the right team; NULL where none connected"),
+        _field("left_score", "int16", "", "goals of the left team"),
+        _field("right_score", "int16", "", "goals of the right team"),
+        _field("left_penalties_scored", "int16", "", "penalties scored by the left team in the shoot-out"),
+        _field("left_penalties_missed", "int16", "", "penalties missed by the left team in the shoot-out"),
+        _field("right_penalties_scored", "int16", "", "penalties scored by the right team in the shoot-out"),
+        _field("right_penalties_missed", "int16", "", "penalties missed by the right team in the shoot-out"),
+        _field("n_frames", "int32", "", "rows of frames"),
+        _field("n_play_on_frames", "int32", "", "frames in play mode play_on"),
+        _field("n_commands", "int32", "", "rows of commands"),
+        _field("n_events", "int32", "", "rows of events"),
+        _field("n_problems", "int32", "", "rows of problems"),
+        _field("complete", "bool", "", "the server closed the game log; false when it was killed or the file is cut"),
+        _field("log_version", "string", "", "version of the game log: 1 to 6, json-17 to json-19; `none` without one"),
+        _field("server_version", "string", "", "rcssserver's version where the log names it"),
+        _field("game_log", "string", "", "file name of the game log; NULL if there was none"),
+        _field("command_log", "string", "", "file name of the command log; NULL if there was none"),
+        _field("teamclone_version", "string", "", "the version of teamclone that read the logs"),
+    ),
+)
+
+FRAME = _field("frame", "int32", "", "index of the frame in its match, from 0")
+
+FRAMES = Table(
+    name="frames",
+    about="One row a frame of the game log: clock, play mode, score, ball.",
+    key=("match_id", "frame"),
+    fields=(MATCH_ID, FRAME, *_logged(columns.FRAMES)),
+)
+
+PLAYER_STATES = Table(
+    name="player_states",
+    about="One row a frame and player, 22 a frame, players who are not on the field included (their state is 0).",
+    key=("match_id", "frame", "side", "unum"),
+    fields=(
+        MATCH_ID,
+        FRAME,
+        _field("side", "int8", "", "1 left, -1 right"),
+        Field(name="unum", dtype="int16", numpy="uint8", unit="", about="player's number, 1 to 11"),
+        *_logged(columns.PLAYERS),
+    ),
+)
+
+COMMANDS = Table(
+    name="commands",
+    about="One row a command that the server received, in the order of the command log.",
+    key=("match_id", "line", "side", "unum", "order"),
+    fields=(
+        MATCH_ID,
+        *_logged(columns.COMMANDS),
+        _field("text", "string", "", "what it says besides numbers: the payload of say, `our 9` of attentionto"),
+    ),
+)
+
+TYPE_FIELDS = {
+    "player_speed_max": ("m/cycle", "highest speed"),
+    "stamina_inc_max": ("stamina/cycle", "stamina recovered a cycle at full recovery"),
+    "player_decay": ("", "share of the velocity left after a cycle"),
+    "inertia_moment": ("cycle/m", "how much speed hampers a turn"),
+    "dash_power_rate": ("m/cycle²", "acceleration of one unit of dash power"),
+    "player_size": ("m", "radius of the body"),
+    "kickable_margin": ("m", "reach beyond the radii of body and ball"),
+    "kick_rand": ("", "noise of a kick"),
+    "extra_stamina": ("stamina", "stamina left when exhausted"),
+    "effort_max": ("", "highest dash efficiency"),
+    "effort_min": ("", "lowest dash efficiency"),
+    "kick_power_rate": ("m/cycle²", "ball acceleration of one unit of kick power"),
+    "foul_detect_probability": ("", "probability that the referee sees a foul of his"),
+    "catchable_area_l_stretch": ("", "how far a goalkeeper's reach stretches, as a factor"),
+}
+"""Unit and meaning of ``player_types.FIELDS``."""
+
+PLAYER_TYPES = Table(
+    name="player_types",
+    about="One row a heterogeneous player type of a match. What an old log leaves out holds the server's default.",
+    key=("match_id", "type"),
+    fields=(
+        MATCH_ID,
+        Field(name="type", dtype="int16", numpy="uint8", unit="", about="id of the type; 0 is the default type"),
+        *(_field(name, "float64", *TYPE_FIELDS[name]) for name in player_types.FIELDS),
+    ),
+)
+
+PARAMETERS = Table(
+    name="parameters",
+    about="One row a parameter that the game log lists, under the name the server gives it.",
+    key=("match_id", "scope", "name"),
+    fields=(
+        MATCH_ID,
+        _field("scope", "string", "", "`server` for server_param, `player` for player_param"),
+        _field("name", "string", "", "name of the parameter"),
+        _field("value", "float64", "", "its number, 0 or 1 for a truth value; NULL for text"),
+        _field("text", "string", "", "its text; NULL for a number"),
+    ),
+)
+
+EVENTS = Table(
+    name="events",
+    about="One row an announcement of the referee in the command log.",
+    key=("match_id", "line"),
+    fields=(MATCH_ID, *_logged(columns.EVENTS), _field("text", "string", "", "its words: `goal_l_1`, `kick_off_r`")),
+)
+
+PROBLEMS = Table(
+    name="problems",
+    about="One row for each thing that was odd in the files of a match.",
+    key=("match_id", "code", "file", "line", "byte"),
+    fields=(
+        MATCH_ID,
+        _field("code", "string", "", "short name for programs: `truncated`"),
+        _field("severity", "string", "", "`note` costs nothing, `warning` some records, `error` the rest of a file"),
+        _field("text", "string", "", "what was expected and what was found"),
+        _field("file", "string", "", "file name; NULL where it concerns both files"),
+        _field("line", "int32", "", "line of the decompressed file, from 1; NULL where unknown"),
+        _field("byte", "int64", "byte", "offset in the decompressed file, from 0; NULL where unknown"),
+        _field("cycle", "int32", "cycle", "server time; NULL where unknown"),
+    ),
+)
+
+
+def _names(name: str, about: str, members: tuple[tuple[int, str], ...]) -> Table:
+    return Table(
+        name=name,
+        about=about,
+        key=("id",),
+        fields=(
+            _field("id", "int16", "", "the number that other tables hold"),
+            _field("name", "string", "", "the server's word"),
+        ),
+        rows=members,
+    )
+
+
+PLAYMODES = _names("playmodes", "The play modes.", tuple((int(mode), mode.name.lower()) for mode in PlayMode))
+COMMAND_KINDS = _names(
+    "command_kinds", "The kinds of commands.", tuple((int(kind), kind.name.lower()) for kind in CommandKind)
+)
+
+MATCH_TABLES = (MATCHES, FRAMES, PLAYER_STATES, COMMANDS, PLAYER_TYPES, PARAMETERS, EVENTS, PROBLEMS)
+"""What every match fills."""
+
+TABLES = (*MATCH_TABLES, PLAYMODES, COMMAND_KINDS)
+
+BY_NAME = {table.name: table for table in TABLES}
+
+
+def table(name: str) -> Table:
+    """The table of a name.
+
+    Raises:
+        UsageError: there is none; near matches are listed.
+    """
+    if name not in BY_NAME:
+        raise UsageError(unknown("table", name, tuple(BY_NAME), where="the store"))
+    return BY_NAME[name]
+
+
+def arrow_schema(fields: tuple[Field, ...]) -> pa.Schema:
+    """Fields as an Arrow schema, with unit and meaning as metadata, so that a Parquet file explains itself."""
+    import pyarrow as pa
+
+    types = {
+        "bool": pa.bool_(),
+        "int8": pa.int8(),
+        "int16": pa.int16(),
+        "int32": pa.int32(),
+        "int64": pa.int64(),
+        "float32": pa.float32(),
+        "float64": pa.float64(),
+        "string": pa.string(),
+        "timestamp": pa.timestamp("ms"),
+    }
+    return pa.schema(
+        [
+            pa.field(field.name, types[field.dtype], metadata={"unit": field.unit, "about": field.about})
+            for field in fields
+        ]
+    )
+
+
+def create_fixed(table: Table) -> str:
+    """The SQL statement that defines a table whose rows are fixed."""
+    rows = ", ".join(f"({number}, '{word}')" for number, word in table.rows)
+    return f"create view {table.name} as select id::smallint as id, name from (values {rows}) as made(id, name)"
+
+
+def markdown() -> str:
+    """The page `docs/data-model.md`; a test holds the file to it."""
+    lines = [
+        "# Data model",
+        "",
+        "<!-- Written by `teamclone.store.schema.markdown()`; a test compares. -->",
+        "",
+        "The tables of a store, for `teamclone sql` and for any reader of its Parquet files or of `store.duckdb`.",
+        "Positions are in metres in the server's frame: origin at the centre spot, +x towards the goal that the left",
+        "team attacks, +y downwards on a monitor, angles in degrees from +x towards +y. Nothing is mirrored for the",
+        "right team.",
+        "A value that the log does not hold is NULL wherever the text says NaN; the NumPy readers return NaN.",
+        f"This is format {FORMAT}.",
+        "",
+        "## On disk",
+        "",
+        "```",
+        "STORE/store.json                          format number, version of teamclone",
+        "STORE/matches/<match_id>/<table>.parquet  the rows of one match",
+        "STORE/matches/<match_id>/meta.json        rows of each table, hashes of the sources, units",
+        "STORE/files/<key>.json                    what became of each source file",
+        "STORE/store.duckdb                        views over the Parquet files, for other programs",
+        "```",
+        "",
+        "The Parquet files are the truth. A folder in `matches/` appears complete or not at all, so that a store can",
+        "be read while matches are added. `store.duckdb` names the files by their full path: after moving a store, the",
+        "next `teamclone ingest` makes it anew; `teamclone` itself never needs it.",
+        "",
+    ]
+    for entry in TABLES:
+        lines += [f"## {entry.name}", "", f"{entry.about} Key: {', '.join(f'`{name}`' for name in entry.key)}.", ""]
+        lines += ["| column | type | unit | meaning |", "| --- | --- | --- | --- |"]
+        lines += [f"| `{item.name}` | {item.sql_type} | {item.unit} | {item.about} |" for item in entry.fields]
+        lines.append("")
+        if entry.rows:
+            lines += [", ".join(f"{number} `{word}`" if word else f"{number}" for number, word in entry.rows) + ".", ""]
+    return "\n".join(lines)

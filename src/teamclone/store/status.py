@@ -1,0 +1,76 @@
+"""What became of each source file."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Self
+
+
+class Outcome(StrEnum):
+    """``ok``: read whole; ``partial``: some records or the rest of the file were lost; ``failed``: nothing was kept."""
+
+    OK = "ok"
+    PARTIAL = "partial"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileStatus:
+    """The status row of one source file.
+
+    Attributes:
+        path: absolute path when it was read.
+        rows: frames of a game log, commands of a command log.
+        match_id: the match its rows are in; None if it failed.
+        error: the first thing that was wrong, with its place; None where nothing was.
+        size: bytes on disk; -1 where the file could not be looked at.
+        mtime_ns: time of the last change, nanoseconds since 1970.
+        content: hash of the decompressed content; None if it failed.
+    """
+
+    path: str
+    outcome: Outcome
+    rows: int
+    match_id: str | None
+    error: str | None
+    size: int
+    mtime_ns: int
+    content: str | None
+
+    @property
+    def key(self) -> str:
+        return key_of(Path(self.path))
+
+    def describes(self, path: Path) -> bool:
+        """The file was not changed since, by size and time."""
+        return (self.size, self.mtime_ns) == stamp(path)
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Self:
+        return cls(**{**values, "outcome": Outcome(values["outcome"])})
+
+
+def key_of(path: Path) -> str:
+    """16 hex digits that name a path, whatever bytes are in it."""
+    return digest(os.fsencode(path.absolute()))
+
+
+def stamp(path: Path) -> tuple[int, int]:
+    """Size in bytes and time of the last change in ns; (-1, 0) where the file cannot be looked at."""
+    try:
+        found = path.stat()
+    except OSError:
+        return -1, 0
+    return found.st_size, found.st_mtime_ns
+
+
+def digest(data: bytes) -> str:
+    """16 hex digits that stand for the content."""
+    return hashlib.blake2b(data, digest_size=8).hexdigest()

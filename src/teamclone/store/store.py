@@ -1,0 +1,133 @@
+"""What a store offers, whatever keeps its rows, and how to open one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from teamclone.logs.match import Columns, Match
+from teamclone.store.status import FileStatus
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+class Added(StrEnum):
+    """What became of a match that was added."""
+
+    ADDED = "added"
+    REPLACED = "replaced"
+    """The store had this match with other commands, or without any."""
+    UNCHANGED = "unchanged"
+    """The store had all of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """The answer to a query, read batch by batch."""
+
+    schema: pa.Schema
+    batches: Iterator[pa.RecordBatch]
+
+
+class Store(Protocol):
+    """Many matches under one SQL schema (``teamclone.store.schema``).
+
+    Readers may work while one ingest writes: they see each match complete or not at all.
+    """
+
+    @property
+    def location(self) -> str:
+        """What ``open_store`` opens it by."""
+
+    def match_ids(self) -> list[str]:
+        """The matches, sorted."""
+
+    def matches(self) -> pa.Table:
+        """The table ``matches``, by start, file name and id."""
+
+    def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
+        """The rows of one match in one table, in the order of its logs; ``columns`` None for all.
+
+        Raises:
+            StoreError: there is no such match, or its rows cannot be read.
+            UsageError: there is no such table or column.
+        """
+
+    def read_match_columns(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> Columns:
+        """One match's rows as NumPy columns, typed as in ``Match``: NULL is NaN, text an object array.
+
+        ``player_states`` columns have the shape (n_frames, 22), left 1..11 then right 1..11; those of every other table
+        (n_rows,). ``columns`` None gives all but ``match_id``. Raises as ``read_table``.
+        """
+
+    def read_parameters(self, match_id: str) -> dict[str, dict[str, float | str]]:
+        """The parameters of one match: ``{"server": {"ball_decay": 0.94, ...}, "player": {...}}``."""
+
+    def stream(self, query: str) -> Rows:
+        """The answer to a query that only reads.
+
+        Raises:
+            UsageError: the query is wrong, or would change something.
+        """
+
+    def sql(self, query: str) -> pa.Table:
+        """All of the answer to a query that only reads. Raises as ``stream``."""
+
+    def add(self, match: Match) -> Added:
+        """Take in a match: all of it or, if that fails, nothing.
+
+        Raises:
+            StoreError: the store cannot be written, for example because the disk is full.
+        """
+
+    def remove(self, match_id: str) -> None:
+        """Forget a match; nothing happens where it is not there."""
+
+    def files(self) -> list[FileStatus]:
+        """The status of every source file ever ingested, by path."""
+
+    def save_files(self, statuses: Iterable[FileStatus]) -> None:
+        """Keep the status of these files, in place of what was known of them."""
+
+    def writing(self) -> AbstractContextManager[None]:
+        """Held by the one ingest that may write.
+
+        Tidies what a killed one left and, at the end, renews what other programs read.
+
+        Raises:
+            StoreError: another ingest holds it.
+        """
+
+
+def create_store(location: str | Path) -> Store:
+    """The store in this folder, made if the folder is missing or empty.
+
+    Raises:
+        StoreError: the folder holds something else, or a store of another format.
+    """
+    from teamclone.store.parquet import ParquetStore
+
+    return ParquetStore.create(Path(location))
+
+
+def open_store(location: str | Path) -> Store:
+    """The store in this folder.
+
+    Raises:
+        StoreError: there is none, or it is of another format; the text names the numbers and the remedy.
+    """
+    from teamclone.store.parquet import ParquetStore
+
+    return ParquetStore.open(Path(location))
+
+
+def is_store(location: str | Path) -> bool:
+    """Whether this folder was made by ``create_store``, of whatever format."""
+    from teamclone.store.parquet import MARKER
+
+    return (Path(location) / MARKER).is_file()

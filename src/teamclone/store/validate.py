@@ -1,0 +1,121 @@
+"""Is a match what it should be? Logs before they are ingested, and the matches of a store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from teamclone.errors import LogError, StoreError
+from teamclone.logs import LogPair, Problem, Severity, find_matches, read_pair
+from teamclone.store import convert, schema
+from teamclone.store.checks import Finding, check_match
+from teamclone.store.store import Store
+from teamclone.store.workers import Died, run_tasks
+
+OnProgress = Callable[[int, int], None]
+"""Called with the matches that are done and their number."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What was found about one match.
+
+    Attributes:
+        name: its file, or its id in a store.
+        error: why nothing could be read, else None.
+        problems: what was odd about its files; of a stored match none, they are in its table ``problems``.
+        findings: the rules that its rows break.
+    """
+
+    name: str
+    match_id: str | None = None
+    frames: int = 0
+    commands: int = 0
+    error: str | None = None
+    problems: tuple[Problem, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def wrong(self) -> list[str]:
+        """All that speaks against it; notes do not."""
+        texts = [] if self.error is None else [self.error]
+        texts += [str(problem) for problem in self.problems if problem.severity is not Severity.NOTE]
+        return texts + [str(finding) for finding in self.findings]
+
+
+def validate_logs(
+    paths: Iterable[Path], *, jobs: int | None = None, on_progress: OnProgress | None = None
+) -> Iterator[Verdict]:
+    """A verdict on every match in these files and folders, in the order of their paths. Writes nothing.
+
+    Raises:
+        UsageError: a path does not exist, or there is no log under any of them.
+    """
+    pairs = find_matches(paths)
+    verdicts: dict[LogPair, Verdict] = {}
+    shown = 0
+    for pair, outcome in run_tasks(_validate_pair, pairs, jobs=jobs):
+        verdicts[pair] = (
+            Verdict(name=str(pair.path), error=f"{pair.path}: the process that read it was killed")
+            if isinstance(outcome, Died)
+            else outcome
+        )
+        if on_progress is not None:
+            on_progress(len(verdicts), len(pairs))
+        while shown < len(pairs) and pairs[shown] in verdicts:
+            yield verdicts[pairs[shown]]
+            shown += 1
+
+
+def _validate_pair(pair: LogPair) -> Verdict:
+    try:
+        match = read_pair(pair)
+    except LogError as error:
+        return Verdict(name=str(pair.path), error=str(error))
+    except OSError as error:
+        return Verdict(name=str(pair.path), error=f"{pair.path}: {error.strerror or error}")
+    return Verdict(
+        name=str(pair.path),
+        match_id=match.match_id,
+        frames=len(match.frames["cycle"]),
+        commands=len(match.commands["cycle"]),
+        problems=match.problems,
+        findings=tuple(check_match(convert.tables_of(match))),
+    )
+
+
+def validate_store(store: Store, *, on_progress: OnProgress | None = None) -> Iterator[Verdict]:
+    """A verdict on every match of a store: its tables can be read, have the rows they should, and break no rule."""
+    match_ids = store.match_ids()
+    for done, match_id in enumerate(match_ids, 1):
+        yield _validate_stored(store, match_id)
+        if on_progress is not None:
+            on_progress(done, len(match_ids))
+
+
+def _validate_stored(store: Store, match_id: str) -> Verdict:
+    try:
+        tables = {table.name: store.read_table(match_id, table.name) for table in schema.MATCH_TABLES}
+    except StoreError as error:
+        return Verdict(name=match_id, match_id=match_id, error=str(error))
+    about = tables[schema.MATCHES.name].to_pylist()
+    if len(about) != 1:
+        return Verdict(
+            name=match_id, match_id=match_id, error=f"{match_id}: expected one row in matches, got {len(about)}"
+        )
+    for name in ("frames", "commands", "events", "problems"):
+        if about[0][f"n_{name}"] != tables[name].num_rows:
+            return Verdict(
+                name=match_id,
+                match_id=match_id,
+                error=f"{match_id}: expected {about[0][f'n_{name}']} rows in {name}, got {tables[name].num_rows}; "
+                "remove the match and ingest it again",
+            )
+    return Verdict(
+        name=match_id,
+        match_id=match_id,
+        frames=about[0]["n_frames"],
+        commands=about[0]["n_commands"],
+        findings=tuple(check_match(tables)),
+    )

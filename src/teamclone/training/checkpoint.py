@@ -1,0 +1,84 @@
+"""Checkpoints: weights, and the one file from which a run goes on. Each is written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import safetensors.torch
+import torch
+from safetensors import SafetensorError, safe_open
+from torch import nn
+
+from teamclone.errors import RunError
+
+
+def write_atomic(path: Path, data: bytes) -> None:
+    """Write a file so that a reader, also after a crash, sees the old one or the new one."""
+    temporary = path.with_name(f".{path.name}.part")
+    with temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+
+
+def save_weights(path: Path, model: nn.Module, *, epoch: int) -> None:
+    """Weights and normalisation of a model, as safetensors; ``epoch`` counts the finished ones."""
+    tensors = {name: tensor.contiguous().cpu() for name, tensor in model.state_dict().items()}
+    write_atomic(path, safetensors.torch.save(tensors, metadata={"epoch": str(epoch)}))
+
+
+def load_weights(path: Path, model: nn.Module) -> int:
+    """Put weights into a model of the same shape; gives the epoch they are of.
+
+    Raises:
+        RunError: the file is damaged or of another model.
+    """
+    tensors, epoch = _read(path)
+    _put(path, model, tensors)
+    return epoch
+
+
+def save_progress(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer, *, epoch: int) -> None:
+    """All that the next epoch depends on beside config and dataset."""
+    tensors = {f"model.{name}": tensor.contiguous().cpu() for name, tensor in model.state_dict().items()}
+    for index, state in optimiser.state_dict()["state"].items():
+        tensors |= {f"optimiser.{index}.{name}": value.contiguous().cpu() for name, value in state.items()}
+    write_atomic(path, safetensors.torch.save(tensors, metadata={"epoch": str(epoch)}))
+
+
+def load_progress(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer) -> int:
+    """Bring model and optimiser to where `save_progress` left them; gives the number of finished epochs."""
+    tensors, epoch = _read(path)
+    weights: dict[str, torch.Tensor] = {}
+    states: dict[int, dict[str, Any]] = {}
+    for key, tensor in tensors.items():
+        owner, _, name = key.partition(".")
+        if owner == "model":
+            weights[name] = tensor
+        else:
+            index, _, name = name.partition(".")
+            states.setdefault(int(index), {})[name] = tensor
+    _put(path, model, weights)
+    optimiser.load_state_dict({"state": states, "param_groups": optimiser.state_dict()["param_groups"]})
+    return epoch
+
+
+def _read(path: Path) -> tuple[dict[str, torch.Tensor], int]:
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+            return {key: file.get_tensor(key) for key in file.keys()}, int(metadata["epoch"])  # noqa: SIM118 - no dict
+    except FileNotFoundError:
+        raise RunError(f"{path}: no such checkpoint") from None
+    except (SafetensorError, KeyError, ValueError) as error:
+        raise RunError(f"{path}: not a checkpoint of teamclone ({error})") from None
+
+
+def _put(path: Path, model: nn.Module, tensors: dict[str, torch.Tensor]) -> None:
+    try:
+        model.load_state_dict(tensors)
+    except RuntimeError as error:
+        raise RunError(f"{path}: of another model than config.toml says ({' '.join(str(error).split())})") from None

@@ -1,0 +1,263 @@
+"""What a training run is made of: presets in TOML, single values overridden, every mistake reported at once."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from importlib import resources
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from teamclone.errors import UsageError
+from teamclone.models.features import FEATURES
+from teamclone.models.network import ACTIVATIONS, ModelConfig
+from teamclone.rcss.player_types import GROUPS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataConfig:
+    """How many samples an epoch and a validation see.
+
+    Attributes:
+        batch_size: samples in a batch.
+        batches_per_epoch: longest slice of the training samples that an epoch takes, in batches.
+        validation_batches: validation samples that are looked at after each epoch, in batches; 0 takes all.
+    """
+
+    batch_size: int = 4096
+    batches_per_epoch: int = 300
+    validation_batches: int = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainConfig:
+    """How the weights are found.
+
+    Attributes:
+        epochs: slices of the training samples to go through.
+        optimiser: adam, rmsprop or adagrad.
+        learning_rate: constant.
+        betas: Adam's two decay rates; no other optimiser has them.
+        epsilon: added to the optimiser's denominator.
+        parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
+        precision: fp32, bf16 (autocast), or auto: bf16 where the processor computes in it.
+        device: cpu, cuda, or auto: cuda where there is one.
+        threads: of the processor; 0 takes all.
+        seed: of the first weights and of the order of the samples.
+        max_minutes: begin no epoch that would end later than this; 0 is no limit. A resumed run counts afresh.
+    """
+
+    epochs: int = 400
+    optimiser: str = "adam"
+    learning_rate: float = 0.001
+    betas: tuple[float, ...] = (0.9, 0.999)
+    epsilon: float = 1e-7
+    parameter_loss: str = "paper"
+    precision: str = "auto"
+    device: str = "auto"
+    threads: int = 0
+    seed: int = 0
+    max_minutes: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Config:
+    """All settings of a run, in the sections of its ``config.toml``."""
+
+    model: ModelConfig = field(default_factory=ModelConfig)
+    data: DataConfig = field(default_factory=DataConfig)
+    train: TrainConfig = field(default_factory=TrainConfig)
+
+
+MAY_CHANGE = ("train.epochs", "train.max_minutes")
+"""Settings that a resumed run may have otherwise than before: they do not change what an epoch does."""
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "model.features": tuple(FEATURES),
+    "model.activation": tuple(ACTIVATIONS),
+    "model.all_types": tuple(GROUPS),
+    "train.optimiser": ("adam", "rmsprop", "adagrad"),
+    "train.parameter_loss": ("paper", "masked"),
+    "train.precision": ("auto", "fp32", "bf16"),
+    "train.device": ("auto", "cpu", "cuda"),
+}
+_AT_LEAST: dict[str, float] = {
+    "model.hidden": 1,
+    "data.batch_size": 1,
+    "data.batches_per_epoch": 1,
+    "data.validation_batches": 0,
+    "train.epochs": 1,
+    "train.threads": 0,
+    "train.seed": 0,
+    "train.max_minutes": 0,
+}
+_ABOVE_ZERO = ("train.learning_rate", "train.epsilon")
+
+
+def preset_names() -> list[str]:
+    """The presets that come with the package."""
+    folder = resources.files("teamclone.training") / "presets"
+    return sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def preset_text(name: str) -> str:
+    """A preset's TOML, comments included.
+
+    Raises:
+        UsageError: there is no such preset.
+    """
+    if name not in preset_names():
+        raise UsageError(f"no preset {name!r}; {_choose(name, preset_names())}")
+    return (resources.files("teamclone.training") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load_config(preset: str = "small", overrides: Sequence[str] = ()) -> Config:
+    """A preset with single values overridden, each as ``section.key=value``.
+
+    Raises:
+        UsageError: naming all that is wrong, in one line.
+    """
+    return override(config_from(tomllib.loads(preset_text(preset)), where=f"preset {preset}"), overrides)
+
+
+def override(config: Config, overrides: Sequence[str]) -> Config:
+    """A config with single values replaced, see `load_config`."""
+    table = to_table(config)
+    errors: list[str] = []
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        section, _, name = key.strip().partition(".")
+        if not equals:
+            errors.append(f"expected section.key=value, got {text!r}")
+        elif name not in table.get(section, {}):
+            errors.append(f"no setting {key.strip()!r}; {_choose(key.strip(), list(_keys(table)))}")
+        else:
+            table[section][name] = _value(value.strip())
+    return config_from(table, where="--set", errors=errors)
+
+
+def config_from(table: dict[str, Any], *, where: str, errors: Iterable[str] = ()) -> Config:
+    """A config from the tables of a TOML file; what it leaves out is as in the paper.
+
+    Raises:
+        UsageError: naming all that is wrong, in one line.
+    """
+    problems = list(errors)
+    sections: dict[str, Any] = {}
+    known = to_table(Config())
+    for section, cls in get_type_hints(Config).items():
+        hints = get_type_hints(cls)
+        given = table.get(section, {})
+        kept: dict[str, Any] = {}
+        for name, value in given.items():
+            key = f"{section}.{name}"
+            if name not in hints:
+                problems.append(f"no setting {key!r}; {_choose(key, list(_keys(known)))}")
+                continue
+            try:
+                kept[name] = _converted(key, value, hints[name])
+            except UsageError as error:
+                problems.append(str(error))
+        sections[section] = cls(**kept)
+    problems += [f"no section {name!r}; there are {', '.join(sections)}" for name in table if name not in sections]
+    config = Config(**sections)
+    if not problems and config.train.optimiser != "adam" and config.train.betas != TrainConfig().betas:
+        problems.append(f"train.betas has no effect with train.optimiser = {config.train.optimiser}; leave it out")
+    if problems:
+        raise UsageError(f"{where}: {'; '.join(problems)}")
+    return config
+
+
+def to_table(config: Config) -> dict[str, dict[str, Any]]:
+    """The sections of a config as plain dictionaries."""
+    return {
+        section.name: {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in asdict(getattr(config, section.name)).items()
+        }
+        for section in fields(config)
+    }
+
+
+def to_toml(config: Config) -> str:
+    """A config as TOML; `config_from` of it is the same config."""
+    lines = []
+    for section, table in to_table(config).items():
+        lines += [f"[{section}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]
+    return "\n".join(lines)
+
+
+def differences(before: Config, after: Config) -> list[str]:
+    """Settings that differ: ``train.seed: 0 became 1``."""
+    old, new = to_table(before), to_table(after)
+    return [
+        f"{key}: {old[section][name]} became {new[section][name]}"
+        for key in _keys(old)
+        for section, name in [key.split(".")]
+        if old[section][name] != new[section][name]
+    ]
+
+
+def _keys(table: dict[str, dict[str, Any]]) -> Iterable[str]:
+    return (f"{section}.{name}" for section, values in table.items() for name in values)
+
+
+def _choose(wrong: str, choices: list[str]) -> str:
+    """``did you mean a or b?``, or all choices where none is near."""
+    near = difflib.get_close_matches(wrong, choices, n=3)
+    if not near:  # `epochs` for `train.epochs`
+        near = [choice for choice in choices if choice.partition(".")[2] == wrong.rpartition(".")[2]]
+    return f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(choices)}"
+
+
+def _value(text: str) -> Any:
+    """A value as TOML writes it; anything else is a word."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _converted(key: str, value: Any, hint: Any) -> Any:
+    """The value as its setting's type, within its bounds."""
+    if get_origin(hint) is tuple:
+        item = get_args(hint)[0]
+        if isinstance(value, str):  # --set model.all_types=kick,stamina
+            value = [_value(part.strip()) for part in value.split(",") if part.strip()]
+        values = value if isinstance(value, list) else [value]
+        converted = tuple(_scalar(key, part, item) for part in values)
+        if key == "train.betas" and not (len(converted) == 2 and all(0 <= beta < 1 for beta in converted)):
+            raise UsageError(f"{key}: expected two numbers from 0 to below 1, got {list(converted)}")
+        if len(set(converted)) != len(converted) and item is str:
+            raise UsageError(f"{key}: names one more than once: {', '.join(converted)}")
+        if key == "model.hidden" and not converted:
+            raise UsageError(f"{key}: expected at least one width")
+        return converted
+    return _scalar(key, value, hint)
+
+
+def _scalar(key: str, value: Any, hint: Any) -> Any:
+    if hint is float and type(value) is int:
+        value = float(value)
+    if type(value) is not hint:
+        words = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
+        raise UsageError(f"{key}: expected {words[hint]}, got {value!r}")
+    if key in _CHOICES and value not in _CHOICES[key]:
+        raise UsageError(f"{key}: no {value!r}; {_choose(value, list(_CHOICES[key]))}")
+    if key in _AT_LEAST and not value >= _AT_LEAST[key]:
+        raise UsageError(f"{key}: expected at least {_AT_LEAST[key]}, got {value}")
+    if key in _ABOVE_ZERO and not value > 0:
+        raise UsageError(f"{key}: expected a number above 0, got {value}")
+    if hint is float and value in (float("inf"),):
+        raise UsageError(f"{key}: expected a finite number, got {value}")
+    return value
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    return f'"{value}"' if isinstance(value, str) else repr(value)

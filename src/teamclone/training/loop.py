@@ -1,0 +1,253 @@
+"""The training loop."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from teamclone.dataset.layout import Split
+from teamclone.dataset.order import epoch_order
+from teamclone.dataset.reader import Dataset
+from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.models.loss import ParameterLoss
+from teamclone.models.network import Clone
+from teamclone.models.state import CHANNEL, State, Target
+from teamclone.training.checkpoint import load_progress, save_progress, save_weights, write_atomic
+from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
+from teamclone.training.run import BEST, RESUME, Run, create_run, open_run, save_config
+from teamclone.training.scores import Scores
+
+FIT_ROWS = 2**20
+"""Training samples that the input normalisation is fitted on, evenly spread; more would not move it."""
+GATHER_ROWS = 16384
+"""Rows gathered at once where the batch size does not matter; bounds memory."""
+
+
+class Progress(NamedTuple):
+    """Where training is: ``epoch`` from 1, ``batch`` finished in it; ``record`` once the epoch is finished."""
+
+    epoch: int
+    epochs: int
+    batch: int
+    batches: int
+    record: dict[str, Any] | None
+
+
+def train(
+    config: Config,
+    dataset: Dataset,
+    run_folder: Path | str,
+    *,
+    resume: bool = False,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> Run:
+    """Train a clone; what a run folder holds is said in `run`.
+
+    Every epoch ends with a checkpoint from which ``resume`` goes on exactly as if nothing had happened: weights,
+    order of the samples and figures are a pure function of config and dataset (on one machine, with as many threads).
+
+    Raises:
+        UsageError: the machine lacks what the config asks for.
+        DatasetError: the dataset lacks training or validation samples, or a value that the inputs need.
+        RunError: the folder holds a run already, or one that does not fit; or training diverged.
+    """
+    from torch.utils.tensorboard import SummaryWriter
+
+    device, autocast = _resources(config.train)
+    rows = dataset.split(Split.TRAIN)
+    validation_rows = _validation_rows(config, dataset)
+    if not len(rows):
+        raise DatasetError(f"{dataset.path}: no training samples; make it again from more matches")
+    run = _continued(config, dataset, Path(run_folder)) if resume else create_run(Path(run_folder), config, dataset)
+
+    torch.manual_seed(config.train.seed)
+    model = Clone(config.model).to(device)
+    optimiser = _optimiser(config.train, model)
+    done = 0
+    if run.checkpoint_path(RESUME).is_file():
+        done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
+    else:
+        _fit_inputs(model, dataset, rows)
+    history = run.history()[:done]
+    write_atomic(run.metrics_path, "".join(json.dumps(record) + "\n" for record in history).encode())
+
+    loss_kind = cast(ParameterLoss, config.train.parameter_loss)
+    batch_size = config.data.batch_size
+    began = time.monotonic()
+    with SummaryWriter(str(run.path / "tensorboard"), purge_step=done + 1) as board:
+        for epoch in range(done + 1, config.train.epochs + 1):
+            epoch_began = time.monotonic()
+            if epoch > done + 1 and config.train.max_minutes:
+                pace = (epoch_began - began) / (epoch - done - 1)
+                if epoch_began + pace - began > 60 * config.train.max_minutes:
+                    break
+
+            torch.manual_seed(_mixed(config.train.seed, epoch))
+            slice_rows = config.data.batches_per_epoch * batch_size
+            order = rows[epoch_order(len(rows), seed=config.train.seed, epoch=epoch - 1, slice_rows=slice_rows)]
+            batches = math.ceil(len(order) / batch_size)
+            scores = Scores(device)
+            model.train()
+            for batch, (state, target) in enumerate(_batches(dataset, order, batch_size, device), 1):
+                with autocast():
+                    output = model.output(state)
+                loss = model.head.loss(output, target, parameter_loss=loss_kind)
+                optimiser.zero_grad(set_to_none=True)
+                loss.total.backward()  # type: ignore[no-untyped-call]
+                optimiser.step()
+                scores.add(loss, model.head.point(output), target)
+                on_progress(Progress(epoch, config.train.epochs, batch, batches, None))
+            record: dict[str, Any] = {"epoch": epoch, "samples": len(order)}
+            record |= {f"train_{name}": value for name, value in scores.table().items()}
+            record["samples_per_s"] = len(order) / (time.monotonic() - epoch_began)
+            model.eval()
+            scores = Scores(device)
+            with torch.no_grad(), autocast():
+                for state, target in _batches(dataset, validation_rows, batch_size, device):
+                    output = model.output(state)
+                    loss = model.head.loss(output, target, parameter_loss=loss_kind)
+                    scores.add(loss, model.head.point(output), target)
+            record |= {f"validation_{name}": value for name, value in scores.table().items()}
+            record["seconds"] = time.monotonic() - epoch_began
+            if not (math.isfinite(record["train_loss"]) and math.isfinite(record["validation_loss"])):
+                kept = f"the checkpoints of epoch {epoch - 1} are kept" if epoch > 1 else "nothing is kept"
+                raise RunError(
+                    f"{run.path}: the loss is not a number in epoch {epoch}; {kept}; try a smaller train.learning_rate"
+                )
+            _finish_epoch(run, model, optimiser, record, history)
+            for name, value in record.items():
+                board.add_scalar(name.replace("_", "/", 1) if "_" in name else name, value, epoch)
+            on_progress(Progress(epoch, config.train.epochs, batches, batches, record))
+    return run
+
+
+def _finish_epoch(
+    run: Run, model: Clone, optimiser: torch.optim.Optimizer, record: dict[str, Any], history: list[dict[str, Any]]
+) -> None:
+    """Write all that an epoch leaves. A kill before the last line repeats the epoch, which writes the same again."""
+    epoch = record["epoch"]
+    with run.metrics_path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(record) + "\n")
+    for name, (figure, better) in BEST.items():
+        before = [past[figure] for past in history if figure in past]
+        if figure in record and all(better(float(record[figure]), float(value)) for value in before):
+            save_weights(run.checkpoint_path(name), model, epoch=epoch)
+    save_weights(run.checkpoint_path("last"), model, epoch=epoch)
+    history.append(record)
+    save_progress(run.checkpoint_path(RESUME), model, optimiser, epoch=epoch)
+
+
+def _continued(config: Config, dataset: Dataset, folder: Path) -> Run:
+    """The run in a folder, if this config and dataset are its own."""
+    run = open_run(folder)
+    if dataset.id != run.dataset_id:
+        raise RunError(
+            f"{folder}: was trained on dataset {run.dataset_id} ({run.dataset_path}), {dataset.path} is {dataset.id}; "
+            "give the same dataset or begin a new run"
+        )
+    changed = [text for text in differences(run.config, config) if text.partition(":")[0] not in MAY_CHANGE]
+    if changed:
+        raise RunError(f"{folder}: cannot resume with other settings ({'; '.join(changed)}); begin a new run")
+    save_config(folder, config)
+    return open_run(folder)
+
+
+def _resources(config: TrainConfig) -> tuple[torch.device, Callable[[], AbstractContextManager[Any]]]:
+    """The device to train on, and a context that computes in the precision asked for."""
+    if config.threads:
+        torch.set_num_threads(config.threads)
+    if config.device == "cuda" and not torch.cuda.is_available():
+        raise UsageError("train.device = cuda, but PyTorch finds no CUDA device here; use cpu or auto")
+    device = torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
+    bfloat = config.precision == "bf16" or (config.precision == "auto" and has_fast_bfloat16(device))
+    return device, lambda: torch.autocast(device.type, torch.bfloat16, enabled=bfloat)
+
+
+def has_fast_bfloat16(device: torch.device) -> bool:
+    """Whether matrix products are faster in bfloat16: three to four times on processors that have it, else slower."""
+    if device.type == "cuda":
+        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
+    able = torch.cpu.get_capabilities()
+    return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
+
+
+def _optimiser(config: TrainConfig, model: Clone) -> torch.optim.Optimizer:
+    weights, rate, epsilon = model.parameters(), config.learning_rate, config.epsilon
+    if config.optimiser == "rmsprop":
+        return torch.optim.RMSprop(weights, lr=rate, eps=epsilon)
+    if config.optimiser == "adagrad":
+        return torch.optim.Adagrad(weights, lr=rate, eps=epsilon)
+    return torch.optim.Adam(weights, lr=rate, betas=(config.betas[0], config.betas[1]), eps=epsilon)
+
+
+def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
+    """The samples to validate on, always the same ones, spread over all validation matches."""
+    rows = dataset.split(Split.VALIDATION)
+    if not len(rows):
+        raise DatasetError(
+            f"{dataset.path}: no validation samples, so no checkpoint can be chosen; make it again from more matches"
+        )
+    wanted = config.data.validation_batches * config.data.batch_size
+    if not wanted or wanted >= len(rows):
+        return rows
+    chosen = np.random.default_rng((config.train.seed, 2)).choice(len(rows), wanted, replace=False)
+    return rows[np.sort(chosen)]
+
+
+def _batches(
+    dataset: Dataset, rows: NDArray[np.int64], batch_size: int, device: torch.device
+) -> Iterator[tuple[State, Target]]:
+    """Batches in order; the next one is gathered while one is used."""
+
+    def gather(start: int) -> tuple[State, Target]:
+        part = rows[start : start + batch_size]
+        return dataset.state(part), dataset.target(part)
+
+    with ThreadPoolExecutor(1) as pool:
+        ahead = pool.submit(gather, 0)
+        for start in range(0, len(rows), batch_size):
+            state, target = ahead.result()
+            ahead = pool.submit(gather, start + batch_size)
+            yield state.to(device), Target(*(tensor.to(device, non_blocking=True) for tensor in target))
+
+
+def _fit_inputs(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> None:
+    """Fit the input normalisation on training samples, and see that they hold every value that the inputs need."""
+    rows = rows[:: max(1, len(rows) // FIT_ROWS)]
+
+    def projected() -> Iterator[torch.Tensor]:
+        for start in range(0, len(rows), GATHER_ROWS):
+            part = rows[start : start + GATHER_ROWS]
+            state = dataset.state(part)
+            _check_present(dataset, part, state, model.inputs.channels)
+            yield model.inputs.project(state.to(device)).cpu()
+
+    device = next(model.parameters()).device
+    model.inputs.fit(projected())
+
+
+def _check_present(dataset: Dataset, rows: NDArray[np.int64], state: State, channels: tuple[str, ...]) -> None:
+    values = {f"ball_{name}": state.ball[:, index] for index, name in enumerate(("x", "y", "vx", "vy"))}
+    values |= {name: state.players[..., CHANNEL[name]].sum(1) for name in channels}
+    for name, column in values.items():
+        if column.isnan().any():
+            match = dataset.matches[int(dataset.match(rows[column.isnan().numpy()][:1]))]
+            raise DatasetError(
+                f"{dataset.path}: match {match['match_id']} has no {name} in its log, which the model needs; "
+                "make the dataset without it, or train with features that do without"
+            )
+
+
+def _mixed(seed: int, epoch: int) -> int:
+    """A seed for one epoch of a run."""
+    return int(np.random.SeedSequence((seed, epoch)).generate_state(1)[0])

@@ -1,0 +1,226 @@
+"""A run folder: everything about one training, enough to resume, evaluate and export it.
+
+RUN/config.toml                  all settings
+RUN/environment.json             format number, dataset, versions, machine
+RUN/metrics.jsonl                one line per epoch
+RUN/tensorboard/                 the same for TensorBoard
+RUN/checkpoints/NAME.safetensors weights: last, best-loss, best-accuracy, best-recall-<command>, best-parameters
+RUN/checkpoints/resume.safetensors  weights and optimiser after the last finished epoch
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from teamclone import __version__
+from teamclone.dataset.reader import Dataset
+from teamclone.errors import RunError, UsageError
+from teamclone.models.network import Clone
+from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.training.checkpoint import load_weights, write_atomic
+from teamclone.training.config import Config, config_from, to_toml
+
+FORMAT = 1
+"""Raised whenever a reader of the old folder would misread the new one."""
+
+RESUME = "resume"
+"""The checkpoint that holds the optimiser too; not a model to load."""
+
+
+BEST: dict[str, tuple[str, Callable[[float, float], bool]]] = {
+    "best-loss": ("validation_loss", float.__lt__),
+    "best-accuracy": ("validation_accuracy", float.__gt__),
+    "best-parameters": ("validation_parameter_mae", float.__lt__),
+    **{
+        f"best-recall-{kind.name.lower()}": (f"validation_recall_{kind.name.lower()}", float.__gt__)
+        for kind in CLONED_KINDS
+    },
+}
+"""Checkpoints by the figure that they are best in, and what is better; of equals the first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Best:
+    """Which epoch a checkpoint is of: that with the best ``value`` of a ``figure`` of the history."""
+
+    checkpoint: str
+    figure: str
+    epoch: int
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A run that has been opened.
+
+    Attributes:
+        path: its folder.
+        config: its settings.
+        environment: ``environment.json``.
+    """
+
+    path: Path
+    config: Config
+    environment: dict[str, Any]
+
+    @property
+    def dataset_path(self) -> Path:
+        """Where the dataset lay that it was trained on."""
+        return Path(self.environment["dataset"]["path"])
+
+    @property
+    def dataset_id(self) -> str:
+        """`Dataset.id` of that dataset."""
+        return str(self.environment["dataset"]["id"])
+
+    @property
+    def metrics_path(self) -> Path:
+        return self.path / "metrics.jsonl"
+
+    def checkpoint_path(self, name: str) -> Path:
+        """Where a checkpoint lies or would lie."""
+        return self.path / "checkpoints" / f"{name}.safetensors"
+
+    def checkpoints(self) -> list[str]:
+        """Names of the checkpoints whose weights can be loaded."""
+        found = (path.stem for path in (self.path / "checkpoints").glob("[!.]*.safetensors"))
+        return sorted(name for name in found if name != RESUME)
+
+    def history(self) -> list[dict[str, Any]]:
+        """One record per finished epoch.
+
+        ``epoch`` (from 1), ``samples`` trained on in it, ``samples_per_s``, ``seconds`` (with validation), and the
+        figures of `scores.Scores.table` under ``train_`` and ``validation_``: ``validation_accuracy``.
+        """
+        if not self.metrics_path.is_file():
+            return []
+        records = []
+        for line in self.metrics_path.read_text(encoding="utf-8").splitlines():
+            try:
+                records.append(json.loads(line))
+            except ValueError:  # cut off by a kill in the midst of writing; resuming writes it again
+                break
+        return records
+
+    def best(self) -> list[Best]:
+        """The best epoch by each figure that ever had a value."""
+        found: list[Best] = []
+        history = self.history()
+        for checkpoint, (figure, better) in BEST.items():
+            best: Best | None = None
+            for record in history:
+                if figure not in record:
+                    continue
+                value = float(record[figure])
+                if best is None or better(value, best.value):
+                    best = Best(checkpoint=checkpoint, figure=figure, epoch=record["epoch"], value=value)
+            found += [best] if best else []
+        return found
+
+    def load_model(self, checkpoint: str = "best-loss") -> Clone:
+        """The trained network, ready to predict.
+
+        Raises:
+            RunError: there is no such checkpoint, or it is damaged.
+        """
+        if checkpoint not in self.checkpoints():
+            there = ", ".join(self.checkpoints()) or "none yet: no epoch was finished"
+            raise RunError(f"{self.path}: no checkpoint {checkpoint!r}; there are {there}")
+        model = Clone(self.config.model)
+        load_weights(self.checkpoint_path(checkpoint), model)
+        return model.eval()
+
+
+def open_run(path: Path | str) -> Run:
+    """Open a run folder.
+
+    Raises:
+        RunError: it is missing, not a run, of another format number, or damaged.
+    """
+    folder = Path(path)
+    environment_path, config_path = folder / "environment.json", folder / "config.toml"
+    if not environment_path.is_file() or not config_path.is_file():
+        what = "not a run, it has no config.toml and environment.json" if folder.exists() else "no such folder"
+        raise RunError(f"{folder}: {what}; make one with `teamclone train`")
+    try:
+        environment = json.loads(environment_path.read_text(encoding="utf-8"))
+        found, dataset = environment["format"], environment["dataset"]
+        _ = dataset["path"], dataset["id"]
+    except (ValueError, TypeError, KeyError) as error:
+        raise RunError(f"{environment_path}: not the description of a run ({error!r})") from None
+    if found != FORMAT:
+        raise RunError(f"{folder}: run of format {found}, this version reads {FORMAT}; train again")
+    try:
+        config = config_from(tomllib.loads(config_path.read_text(encoding="utf-8")), where=str(config_path))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RunError(f"{config_path}: not TOML ({error})") from None
+    except UsageError as error:
+        raise RunError(str(error)) from None
+    return Run(path=folder.resolve(), config=config, environment=environment)
+
+
+def is_run(path: Path) -> bool:
+    """Whether a training was begun in this folder."""
+    return (path / "environment.json").is_file()
+
+
+def create_run(path: Path, config: Config, dataset: Dataset) -> Run:
+    """Begin a run folder.
+
+    Raises:
+        RunError: the folder holds something already.
+    """
+    if is_run(path):
+        raise RunError(f"{path}: already holds a run; add --resume to go on with it, or choose another folder")
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise RunError(f"{path}: is not an empty folder; choose another one")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        (temporary / "checkpoints").mkdir(parents=True)
+        save_config(temporary, config)
+        write_atomic(temporary / "environment.json", json.dumps(_environment(dataset), indent=2).encode() + b"\n")
+        temporary.rename(path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return open_run(path)
+
+
+def save_config(path: Path, config: Config) -> None:
+    write_atomic(path / "config.toml", to_toml(config).encode())
+
+
+def _environment(dataset: Dataset) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "dataset": {"path": str(dataset.path), "id": dataset.id, "team": dataset.meta["team"]},
+        "teamclone": __version__,
+        "python": platform.python_version(),
+        "torch": torch.__version__,
+        "numpy": np.__version__,
+        "platform": platform.platform(),
+        "processor": _processor(),
+        "threads": torch.get_num_threads(),
+        "cuda": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), platform.processor())

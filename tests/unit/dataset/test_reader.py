@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from tests.synthetic import make_dataset
+
+from teamclone.dataset.layout import DETAIL_CHANNELS, FRAME_ARRAYS, MISSING, PLAYER_CHANNELS, SAMPLE_ARRAYS, Split
+from teamclone.dataset.reader import open_dataset
+from teamclone.dataset.write import write_dataset
+from teamclone.errors import DatasetError
+from teamclone.models.state import CHANNEL, TYPE_FIELD
+from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.player_types import FIELDS
+
+DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
+
+
+def tiny(folder: Path, **changes: np.ndarray) -> Path:
+    """Two matches of one frame each; three samples."""
+    frames = {array.name: np.zeros((2, *array.shape), array.dtype) for array in FRAME_ARRAYS}
+    samples = {array.name: np.zeros((3, *array.shape), array.dtype) for array in SAMPLE_ARRAYS}
+    frames["match"][:] = (0, 1)
+    frames["ball"][1] = (1.5, -2.0, 0.25, -0.5)
+    frames["position"][1, 7] = (-30.25, 12.5)
+    frames["detail"][1, 7, DETAIL["vx"]] = -1234
+    frames["detail"][1, 7, DETAIL["body"]] = -17999
+    frames["detail"][1, 7, DETAIL["stamina"]] = 31999
+    frames["detail"][1, 7, DETAIL["capacity"]] = 32650
+    frames["detail"][1, 7, DETAIL["type"]] = 2
+    frames["detail"][1, 7, DETAIL["last_command"]] = CommandKind.KICK
+    frames["detail"][1, 3, DETAIL["last_command"]] = CommandKind.CATCH
+    frames["detail"][0, 5, DETAIL["last_command"]] = MISSING
+    frames["detail"][0, :, DETAIL["neck"]] = MISSING
+    samples["frame"][:] = (0, 1, 1)
+    samples["player"][:] = (5, 7, 3)
+    samples["kind"][:] = (0, 2, 1)
+    samples["parameters"][1] = (80.0, -45.0)
+    samples["split"][:] = (Split.TRAIN, Split.TEST, Split.TRAIN)
+    for name, value in changes.items():
+        (frames if name in frames else samples)[name] = value
+    types = np.arange(2 * 3 * len(FIELDS), dtype=np.float32).reshape(2, 3, len(FIELDS))
+    meta = {"team": "A", "matches": [{"match_id": "a"}, {"match_id": "b"}]}
+    return write_dataset(folder, frames=frames, samples=samples, player_types=types, meta=meta)
+
+
+def test_rows_become_raw_states(tmp_path: Path) -> None:
+    dataset = open_dataset(tiny(tmp_path / "ds"))
+    rows = np.array([1, 0, 1])
+    state = dataset.state(rows)
+    assert state.ball.tolist() == [[1.5, -2.0, 0.25, -0.5], [0] * 4, [1.5, -2.0, 0.25, -0.5]]
+    assert state.actor.tolist() == [7, 5, 7]
+    assert state.players.shape == (3, 22, len(PLAYER_CHANNELS))
+    player = dict(zip(PLAYER_CHANNELS, state.players[0, 7].tolist(), strict=True))
+    expected = {"x": -30.25, "y": 12.5, "vx": -0.1234, "body": -179.99, "stamina": 7999.75, "capacity": 130600.0}
+    assert {name: player[name] for name in expected} == pytest.approx(expected, rel=1e-6)
+    # Types: of match 1, type 2 for player 7 and type 0 for the others; of match 0, type 0.
+    assert state.types[0, 7, 0] == (3 + 2) * len(FIELDS)
+    assert state.types[0, 6, 0] == 3 * len(FIELDS)
+    assert state.types[1, 7, TYPE_FIELD["player_decay"]] == TYPE_FIELD["player_decay"]
+    target = dataset.target(rows)
+    assert target.kind.tolist() == [2, 0, 2]
+    assert target.parameters.tolist() == [[80, -45], [0, 0], [80, -45]]
+
+
+def test_what_the_log_lacks_is_nan(tmp_path: Path) -> None:
+    state = open_dataset(tiny(tmp_path / "ds")).state(torch.tensor([0, 1]))
+    assert state.players[0, :, CHANNEL["neck"]].isnan().all()
+    assert not state.players[1].isnan().any()
+
+
+def test_last_kind_is_the_actors_own_executed_command(tmp_path: Path) -> None:
+    # Row 0: not in the log; row 1: kick; row 2: catch, which no clone predicts.
+    assert open_dataset(tiny(tmp_path / "ds")).last_kind(np.arange(3)).tolist() == [-1, 2, -1]
+
+
+def test_splits_and_matches(tmp_path: Path) -> None:
+    dataset = open_dataset(tiny(tmp_path / "ds"))
+    assert dataset.split(Split.TRAIN).tolist() == [0, 2]
+    assert dataset.split(Split.TEST).tolist() == [1]
+    assert dataset.split(Split.UNSEEN).tolist() == []
+    assert dataset.match(np.array([2, 0])).tolist() == [1, 0]
+    assert [match["match_id"] for match in dataset.matches] == ["a", "b"]
+
+
+def test_id_follows_the_content(tmp_path: Path) -> None:
+    same = open_dataset(tiny(tmp_path / "one")).id, open_dataset(tiny(tmp_path / "two")).id
+    assert same[0] == same[1]
+    other = open_dataset(tiny(tmp_path / "three", executed=np.array([True, False, False])))
+    assert other.id != same[0]
+
+
+def test_made_dataset_has_every_split(tmp_path: Path) -> None:
+    dataset = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=20))
+    assert [len(dataset.split(split)) for split in Split] == [200] * 4
+
+
+@pytest.mark.parametrize(
+    ("array", "value", "text"),
+    [
+        ("frame", np.array([0, 1, 2]), "samples/frame: expected 0..1, got 0..2"),
+        ("player", np.array([0, 1, 11]), "samples/player: expected 0..10"),
+        ("kind", np.array([0, 1, 4]), "samples/kind: expected 0..3"),
+        ("match", np.array([0, 2]), "frames/match: expected 0..1"),
+        ("ball", np.zeros((2, 3), np.float32), r"frames/ball: expected shape \(2, 4\)"),
+        ("split", np.zeros(2), r"samples/split: expected shape \(3,\)"),
+    ],
+)
+def test_writer_refuses_what_readers_could_not_gather(tmp_path: Path, array: str, value: np.ndarray, text: str) -> None:
+    with pytest.raises(DatasetError, match=text):
+        tiny(tmp_path / "ds", **{array: value})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_writer_does_not_touch_what_is_there(tmp_path: Path) -> None:
+    tiny(tmp_path / "ds")
+    with pytest.raises(DatasetError, match="already exists"):
+        tiny(tmp_path / "ds")
+    assert len(open_dataset(tmp_path / "ds")) == 3
+
+
+def test_a_failed_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "save", full)
+    with pytest.raises(OSError, match="No space left"):
+        tiny(tmp_path / "ds")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_foreign_or_other_format(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="nowhere: no such folder; make one with `teamclone dataset`"):
+        open_dataset(tmp_path / "nowhere")
+    with pytest.raises(DatasetError, match=r"not a dataset, it has no dataset\.json"):
+        open_dataset(tmp_path)
+    document = tiny(tmp_path / "ds") / "dataset.json"
+    meta = json.loads(document.read_text())
+    document.write_text(json.dumps(meta | {"format": 99}))
+    with pytest.raises(DatasetError, match=r"dataset of format 99, this version reads 1; make it again"):
+        open_dataset(tmp_path / "ds")
+    for text in ("{", "[]", "{}", "3"):
+        document.write_text(text)
+        with pytest.raises(DatasetError, match="not the description of a dataset"):
+            open_dataset(tmp_path / "ds")
+
+
+@pytest.mark.parametrize("name", ["frames/detail", "samples/kind", "player_types"])
+def test_damaged_arrays(tmp_path: Path, name: str) -> None:
+    path = tiny(tmp_path / "ds") / f"{name}.npy"
+    whole = path.read_bytes()
+    for length in (0, 5, 60, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(DatasetError, match=r"\.npy: damaged"):
+            open_dataset(tmp_path / "ds")
+    np.save(path, np.zeros(7))
+    with pytest.raises(DatasetError, match=r"\.npy: expected .*, got float64 \(7,\)"):
+        open_dataset(tmp_path / "ds")
+    path.unlink()
+    with pytest.raises(DatasetError, match=r"\.npy: missing"):
+        open_dataset(tmp_path / "ds")

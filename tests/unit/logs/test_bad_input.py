@@ -1,0 +1,228 @@
+"""Whatever the bytes: a match with what was readable, or one ``LogError`` that names the file. Nothing else."""
+
+from __future__ import annotations
+
+import gzip
+import lzma
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from teamclone.errors import LogError
+from teamclone.logs import Match, read_match
+from teamclone.logs.match import GameLog
+from teamclone.logs.rcl import read_commands
+from teamclone.logs.read import read_game
+
+HERE = Path("some.rcg")
+
+
+FORMATS = ("v6", "native-v5", "native-v4", "native-v3", "native-v2", "native-v1", "json")
+N_FRAMES = 2
+
+
+@pytest.fixture(scope="module")
+def short(rcg_of: Callable[[str], Path]) -> Callable[[str], bytes]:
+    """The first two frames of a real log, without its parameters."""
+
+    @cache
+    def cut(name: str) -> bytes:
+        data = gzip.decompress(rcg_of(name).read_bytes())
+        if data.startswith((b"ULG4", b"ULG5", b"ULG6", b"[")):
+            lines = data.splitlines(keepends=True)
+            shows = [index for index, line in enumerate(lines) if line.startswith((b"(show", b'{"show'))]
+            head = [line for line in lines[: shows[0]] if b"_param" not in line and b"player_type" not in line]
+            return b"".join(head + lines[shows[0] : shows[0] + N_FRAMES] + lines[-3:])
+        if data.startswith(b"ULG\x02"):
+            return data[: 4 + N_FRAMES * 318]
+        if data.startswith(b"ULG\x03"):
+            mode = data.index(b"\x00\x05\x04\x00\x06HELIOS")
+            return data[:4] + data[mode : mode + 3 + 38 + N_FRAMES * 1430]
+        return data[: (1 + N_FRAMES) * 2052]
+
+    return cut
+
+
+def attempt(data: bytes) -> GameLog | None:
+    try:
+        return read_game(data, path=HERE)
+    except LogError as error:
+        assert str(error).startswith("some.rcg: ")
+        assert "\n" not in str(error)
+        return None
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_truncated_at_every_byte(short: Callable[[str], bytes], name: str):
+    data = short(name)
+    whole = read_game(data, path=HERE)
+    assert len(whole.frames["cycle"]) == N_FRAMES
+    assert not whole.problems
+    most = 0
+    for stop in range(len(data)):
+        game = attempt(data[:stop])
+        if game is None:
+            # What was kept once is not lost again by a longer file.
+            assert most == 0
+            continue
+        n_frames = len(game.frames["cycle"])
+        assert most <= n_frames <= N_FRAMES
+        most = n_frames
+        assert game.problems or not game.complete or n_frames == N_FRAMES
+        for side in ("frames", "players"):
+            for column, values in getattr(game, side).items():
+                np.testing.assert_array_equal(values, getattr(whole, side)[column][:n_frames], err_msg=column)
+    assert most == N_FRAMES
+
+
+def test_a_command_log_truncated_at_every_byte(match_of: Callable[[str], Match]):
+    lines = match_of("v6").log.text.splitlines(keepends=True)
+    data = b"".join(lines[:3] + lines[9000:9012])
+    whole = read_commands(data, left="HELIOS_base", right="WEBase", path=HERE)
+    assert not whole.problems
+    for stop in range(len(data)):
+        try:
+            log = read_commands(data[:stop], left="HELIOS_base", right="WEBase", path=HERE)
+        except LogError as error:
+            assert str(error).startswith("some.rcg: ")
+            assert stop < len(b"0,20\t")
+            continue
+        n_commands = int((log.commands["line"] < log.text.count(b"\n") + 1).sum())
+        for column in ("cycle", "side", "unum", "kind", "arg0"):
+            np.testing.assert_array_equal(log.commands[column][:n_commands], whole.commands[column][:n_commands])
+
+
+@pytest.mark.parametrize("pack", [gzip.compress, lzma.compress])
+def test_a_packed_log_truncated_at_every_byte(
+    short: Callable[[str], bytes], tmp_path: Path, pack: Callable[[bytes], bytes]
+):
+    data = short("v6")
+    packed = pack(data)
+    path = tmp_path / "cut.rcg.gz"
+    n_read = 0
+    for stop in range(0, len(packed), 3):
+        path.write_bytes(packed[:stop])
+        try:
+            match = read_match(path)
+        except LogError as error:
+            assert str(error).startswith(str(path))
+            assert n_read == 0
+            continue
+        n_read += 1
+        assert "truncated" in {problem.code for problem in match.problems}
+        assert len(match.frames["cycle"]) <= N_FRAMES
+    assert n_read > 10
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@settings(max_examples=80, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_damaged_bytes(short: Callable[[str], bytes], name: str, seed: int):
+    rng = np.random.default_rng(seed)
+    data = bytearray(short(name))
+    for _ in range(rng.integers(1, 6)):
+        at = int(rng.integers(len(data)))
+        match rng.integers(3):
+            case 0:
+                data[at] = rng.integers(256)
+            case 1:
+                del data[at : at + int(rng.integers(1, 40))]
+            case _:
+                data[at:at] = rng.choice(
+                    [b"\n", b"(", b")", b"nan", b"-", b"1e400", b"99999999999999999999", b"\x00", b'"']
+                )
+    game = attempt(bytes(data))
+    if game is not None:
+        assert len(game.frames["cycle"]) >= 1
+        assert game.players["x"].shape == (len(game.frames["cycle"]), 22)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    start=st.sampled_from(
+        [b"", b"ULG4\n", b"ULG6\n", b"ULG6\n[\n", b"JSON\n[", b"[\n", b"ULG\x02", b"ULG\x03", b"\x00\x01"]
+    ),
+    rest=st.binary(max_size=200),
+)
+def test_garbage(start: bytes, rest: bytes):
+    attempt(start + rest)
+
+
+FOREIGN = {
+    "empty": b"",
+    "picture": b"\x89PNG\r\n\x1a\n" + bytes(100),
+    "page": b"<!doctype html><title>404</title>",
+    "words": b"The quick brown fox\n" * 10,
+    "array": b"[1, 2, 3]",
+    "zeros": bytes(5000),
+    "header": b"ULG6\n",
+    "parameters": b"ULG6\n(server_param (goal_width 14.02))\n(playmode 1 kick_off_l)\n",
+    "packed page": gzip.compress(b"<!doctype html>"),
+    "packed nothing": gzip.compress(b""),
+    "packing cut": gzip.compress(b"ULG6\n")[:12],
+}
+
+
+@pytest.mark.parametrize("content", FOREIGN.values(), ids=FOREIGN.keys())
+def test_foreign_files_are_refused_in_one_line(tmp_path: Path, content: bytes):
+    path = tmp_path / "foreign.rcg"
+    path.write_bytes(content)
+    with pytest.raises(LogError) as caught:
+        read_match(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_files_and_folders(tmp_path: Path):
+    for path in (tmp_path / "none.rcg", tmp_path):
+        with pytest.raises(LogError) as caught:
+            read_match(path)
+        assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize("packing", ["", ".gz", ".xz", ".zst"])
+def test_packings_and_streams(rcg_of: Callable[[str], Path], tmp_path: Path, packing: str):
+    import zstandard
+
+    data = gzip.decompress(rcg_of("onesided").read_bytes())
+    pack = {"": bytes, ".gz": gzip.compress, ".xz": lzma.compress, ".zst": zstandard.compress}[packing]
+    path = tmp_path / f"x.rcg{packing}"
+    path.write_bytes(pack(data))
+    with path.open("rb") as stream:
+        from_stream = read_match(stream)
+    assert read_match(path).match_id == from_stream.match_id
+    assert len(from_stream.frames["cycle"]) == 99
+
+
+def test_a_lone_command_log(rcg_of: Callable[[str], Path], tmp_path: Path):
+    rcl = rcg_of("v6").with_name(rcg_of("v6").name.replace(".rcg", ".rcl"))
+    path = tmp_path / "lone.rcl.gz"
+    path.write_bytes(rcl.read_bytes())
+    match = read_match(path)
+    assert (match.rcg_path, match.rcl_path) == (None, path)
+    assert "no-game-log" in {problem.code for problem in match.problems}
+    assert len(match.commands["kind"]) == 30511
+    assert (match.commands["frame"] == -1).all()
+    assert match.players["x"].shape == (0, 22)
+
+
+def test_a_lone_game_log(rcg_of: Callable[[str], Path], tmp_path: Path):
+    path = tmp_path / "lone.rcg.gz"
+    path.write_bytes(rcg_of("v6").read_bytes())
+    match = read_match(path)
+    assert [problem.code for problem in match.problems] == ["no-command-log"]
+    assert len(match.commands["kind"]) == 0
+
+
+@pytest.mark.parametrize("other", ["goalie3", "crash"])
+def test_the_command_log_of_another_match_is_left_out(rcg_of: Callable[[str], Path], other: str):
+    rcl = next(rcg_of(other).parent.glob("*.rcl.gz"))
+    match = read_match(rcg_of("v6"), partner=rcl)
+    problem = next(problem for problem in match.problems if problem.code == "mismatched")
+    assert str(problem).startswith(str(rcl))
+    assert match.log is None

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+from math import log
+
+import pytest
+import torch
+
+from teamclone.models.loss import clone_loss, issued, projected_parameters
+from teamclone.models.state import Target
+
+TARGET = Target(
+    kind=torch.tensor([0, 1, 2, 3]),
+    parameters=torch.tensor([[50.0, -90.0], [45.0, 0.0], [100.0, 180.0], [-18.0, 0.0]]),
+)
+
+
+def test_parameters_take_the_places_of_table_two() -> None:
+    assert projected_parameters(TARGET).tolist() == [
+        pytest.approx(row)
+        for row in ([0.5, -0.5, 0, 0, 0, 0], [0, 0, 0.25, 0, 0, 0], [0, 0, 0, 1, 1, 0], [0, 0, 0, 0, 0, -0.1])
+    ]
+    assert issued(TARGET.kind).int().tolist() == [
+        [1, 1, 0, 0, 0, 0],
+        [0, 0, 1, 0, 0, 0],
+        [0, 0, 0, 1, 1, 0],
+        [0, 0, 0, 0, 0, 1],
+    ]
+
+
+def test_the_papers_loss_by_hand() -> None:
+    logits = torch.log(torch.tensor([[0.7, 0.1, 0.1, 0.1], [0.25, 0.25, 0.25, 0.25]]))
+    predicted = torch.tensor([[0.5, 0.1, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.25, 0.0, 0.0, -0.3]])
+    target = Target(*(part[:2] for part in TARGET))
+    loss = clone_loss(logits, predicted, target)
+    # Row 0: dash direction off by .6, turn moment .2 where zero is asked; row 1: tackle direction -.3 likewise.
+    mse = (0.6**2 + 0.2**2 + 0.3**2) / 12
+    assert float(loss.cross_entropy) == pytest.approx(-(log(0.7) + log(0.25)) / 2)
+    assert float(loss.parameter_mse) == pytest.approx(mse)
+    assert float(loss.total) == pytest.approx(-(log(0.7) + log(0.25)) / 2 + mse)
+
+
+def test_masked_loss_looks_at_issued_parameters_only() -> None:
+    predicted = torch.tensor([[0.5, 0.1, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.35, 0.0, 0.0, -0.3]])
+    target = Target(*(part[:2] for part in TARGET))
+    loss = clone_loss(torch.zeros(2, 4), predicted, target, parameter_loss="masked")
+    # Three parameters were issued: dash power exact, dash direction off by .6, turn moment by .1.
+    assert float(loss.parameter_mse) == pytest.approx((0.6**2 + 0.1**2) / 3)
+
+
+def test_no_gradient_reaches_parameters_that_the_mask_hides() -> None:
+    predicted = torch.full((4, 6), 0.9, requires_grad=True)
+    clone_loss(torch.zeros(4, 4), predicted, TARGET, parameter_loss="masked").total.backward()
+    assert predicted.grad is not None
+    assert torch.equal(predicted.grad != 0, issued(TARGET.kind))

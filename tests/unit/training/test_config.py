@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teamclone.errors import UsageError
+from teamclone.training.config import (
+    Config,
+    config_from,
+    differences,
+    load_config,
+    override,
+    preset_names,
+    preset_text,
+    to_table,
+    to_toml,
+)
+
+TABLE = to_table(Config())
+
+
+def test_the_paper_preset_is_table_three() -> None:
+    config = load_config("paper")
+    assert config.train.epochs == 400
+    assert config.data.batches_per_epoch == 300
+    assert config.data.validation_batches == 200
+    assert config.data.batch_size == 4096
+    assert config.train.optimiser == "adam"
+    assert config.train.learning_rate == 0.001
+    assert config.train.betas == (0.9, 0.999)
+    assert config.train.epsilon == 1e-7
+    assert config.train.parameter_loss == "paper"
+    assert config.model.hidden == (512, 256, 128)
+    assert config.model.activation == "relu"
+    assert config == Config()
+
+
+def test_small_is_the_same_network() -> None:
+    assert load_config("small").model == load_config("paper").model
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_presets_say_every_setting_and_survive_a_round_trip(name: str) -> None:
+    table = tomllib.loads(preset_text(name))
+    assert {key: set(values) for key, values in table.items()} == {key: set(values) for key, values in TABLE.items()}
+    config = load_config(name)
+    assert config_from(tomllib.loads(to_toml(config)), where="x") == config
+
+
+@given(
+    rate=st.floats(1e-12, 1e3),
+    seed=st.integers(0, 2**62),
+    hidden=st.lists(st.integers(1, 4096), min_size=1, max_size=5),
+    own=st.booleans(),
+)
+def test_any_config_survives_a_round_trip(rate: float, seed: int, hidden: list[int], own: bool) -> None:
+    config = load_config(
+        "small",
+        [f"train.learning_rate={rate}", f"train.seed={seed}", f"model.hidden={hidden}", f"model.own_type={own}".lower()],
+    )
+    assert config.train.learning_rate == rate
+    assert config.model.hidden == tuple(hidden)
+    assert config_from(tomllib.loads(to_toml(config)), where="x") == config
+
+
+def test_overrides_are_read_as_their_setting_wants() -> None:
+    config = load_config(
+        "small",
+        [
+            "train.learning_rate=3e-4",
+            "train.max_minutes=30",
+            "train.optimiser=rmsprop",
+            'train.precision="fp32"',
+            "model.all_types=kick, stamina",
+            "model.hidden=64",
+            "model.own_type=true",
+        ],
+    )
+    assert config.train.learning_rate == 3e-4
+    assert config.train.max_minutes == 30.0
+    assert isinstance(config.train.max_minutes, float)
+    assert (config.train.optimiser, config.train.precision) == ("rmsprop", "fp32")
+    assert config.model.all_types == ("kick", "stamina")
+    assert config.model.hidden == (64,)
+    assert config.model.own_type
+    assert override(config, ["model.all_types=[]"]).model.all_types == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "answer"),
+    [
+        ("train.learning_rat=1", "no setting 'train.learning_rat'; did you mean train.learning_rate"),
+        ("epochs=3", "no setting 'epochs'; did you mean train.epochs?"),
+        ("zzz=1", "no setting 'zzz'; choose from model.features"),
+        ("train.epochs", "expected section.key=value, got 'train.epochs'"),
+        ("train.epochs=many", "train.epochs: expected a whole number, got 'many'"),
+        ("train.epochs=1.5", "train.epochs: expected a whole number, got 1.5"),
+        ("train.epochs=true", "train.epochs: expected a whole number, got True"),
+        ("train.epochs=0", "train.epochs: expected at least 1, got 0"),
+        ("train.learning_rate=-1", "train.learning_rate: expected a number above 0"),
+        ("train.learning_rate=nan", "train.learning_rate: expected a number above 0"),
+        ("train.learning_rate=inf", "train.learning_rate: expected a finite number"),
+        ("train.max_minutes=nan", "train.max_minutes: expected at least 0"),
+        ("train.optimiser=adm", "train.optimiser: no 'adm'; did you mean adam"),
+        ("train.betas=[0.9]", "train.betas: expected two numbers"),
+        ("train.betas=[0.9, 1.0]", "train.betas: expected two numbers"),
+        ("model.own_type=1", "model.own_type: expected true or false, got 1"),
+        ("model.all_types=[1]", "model.all_types: expected a word, got 1"),
+        ("model.all_types=kik", "model.all_types: no 'kik'; did you mean kick?"),
+        ("model.all_types=kick,kick", "model.all_types: names one more than once"),
+        ("model.hidden=[]", "model.hidden: expected at least one width"),
+        ("model.hidden=[0]", "model.hidden: expected at least 1, got 0"),
+        ("model.features=papr", "model.features: no 'papr'; did you mean paper?"),
+    ],
+)
+def test_mistakes_are_named(text: str, answer: str) -> None:
+    with pytest.raises(UsageError) as error:
+        load_config("small", [text])
+    assert answer in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_all_mistakes_are_told_at_once() -> None:
+    with pytest.raises(UsageError) as error:
+        load_config("small", ["train.epochs=x", "data.batch_size=0", "modell.hidden=3"])
+    for part in ("train.epochs", "data.batch_size", "modell.hidden"):
+        assert part in str(error.value)
+
+
+def test_a_setting_without_effect_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"train\.betas has no effect with train\.optimiser = rmsprop"):
+        load_config("small", ["train.optimiser=rmsprop", "train.betas=[0.8, 0.9]"])
+
+
+def test_unknown_presets_and_sections() -> None:
+    with pytest.raises(UsageError, match=r"no preset 'papr'; did you mean paper\?"):
+        load_config("papr")
+    with pytest.raises(UsageError, match="no section 'other'; there are model, data, train"):
+        config_from({"other": {}}, where="config.toml")
+
+
+def test_differences_name_the_settings() -> None:
+    before = load_config("small")
+    after = override(before, ["train.seed=4", "model.own_type=true"])
+    assert differences(before, after) == ["model.own_type: False became True", "train.seed: 0 became 4"]
+    assert differences(before, before) == []

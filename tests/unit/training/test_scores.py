@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import pytest
+import torch
+
+from teamclone.models.loss import Loss
+from teamclone.models.network import Prediction
+from teamclone.models.state import Target
+from teamclone.training.scores import Scores
+
+CPU = torch.device("cpu")
+
+
+def test_figures_by_hand_over_unequal_batches() -> None:
+    scores = Scores(CPU)
+    one_hot = torch.eye(4)
+    # Truth dash, dash, turn; said dash, kick, turn. Dash power predicted 100 for 50, else zeros.
+    scores.add(
+        Loss(torch.tensor(0.0), torch.tensor(0.3), torch.tensor(0.06)),
+        Prediction(one_hot[[0, 2, 1]], torch.tensor([[100.0, 0, 0, 0, 0, 0], [0.0] * 6, [0.0] * 6])),
+        Target(torch.tensor([0, 0, 1]), torch.tensor([[50.0, 0.0], [0.0, 90.0], [0.0, 0.0]])),
+    )
+    # Truth kick; said kick, but with a turn moment of 36 degrees that was not issued.
+    scores.add(
+        Loss(torch.tensor(0.0), torch.tensor(0.7), torch.tensor(0.02)),
+        Prediction(one_hot[[2]], torch.tensor([[0.0, 0, 36, 0, 0, 0]])),
+        Target(torch.tensor([2]), torch.tensor([[20.0, 0.0]])),
+    )
+    table = scores.table()
+    assert table == pytest.approx(
+        {
+            "loss": (3 * 0.36 + 0.72) / 4,
+            "cross_entropy": (3 * 0.3 + 0.7) / 4,
+            "parameter_mse": (3 * 0.06 + 0.02) / 4,
+            "accuracy": 3 / 4,
+            # .5 of dash power, .5 of dash direction, .2 of the turn moment not issued, .2 of kick power; 4 rows of 6.
+            "parameter_mae": (0.5 + 0.5 + 0.2 + 0.2) / 24,
+            # The same without the turn moment; issued are 2 + 2 + 1 + 2 parameters.
+            "issued_mae": (0.5 + 0.5 + 0.2) / 7,
+            "recall_dash": 1 / 2,
+            "recall_turn": 1,
+            "recall_kick": 1,
+        }
+    )
+    assert "recall_tackle" not in table

@@ -40,7 +40,7 @@ demo: install
 	$(BIN)/teamclone report $(DEMO)/run
 
 test: install browser
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadscope
 
 lint: install
 	$(BIN)/ruff check .

@@ -22,6 +22,9 @@ from teamclone.cli import (
 from teamclone.cli.common import fail
 from teamclone.errors import TeamcloneError, UsageError
 
+EXTRAS = {"torch": "train", "safetensors": "train", "tensorboard": "train", "matplotlib": "report", "jinja2": "report"}
+"""The extra that installs a package which the base does not."""
+
 app = typer.Typer(
     name="teamclone",
     help="Learn how a RoboCup Soccer Simulation 2D team plays, from the logs of its matches.",
@@ -62,6 +65,11 @@ def main() -> None:
         fail(str(error), code=2)
     except TeamcloneError as error:
         fail(str(error), code=1)
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").partition(".")[0]
+        if missing not in EXTRAS:
+            raise
+        fail(f"this needs {missing}: pip install 'teamclone[{EXTRAS[missing]}]'", code=1)
     except KeyboardInterrupt:
         fail("interrupted", code=130)
     except BrokenPipeError:

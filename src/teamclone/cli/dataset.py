@@ -28,7 +28,7 @@ def dataset(
     validation_match: Annotated[list[str] | None, typer.Option(help="The same for validation; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
     replace: Annotated[bool, typer.Option(help="Put it in the place of a dataset that is already there.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the cleaning report as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the cleaning report as JSON.")] = False,
 ) -> None:
     """Clean a store and bind every command of a team to the state it was decided on."""
     from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
@@ -56,7 +56,7 @@ def dataset(
             replace=replace,
             on_progress=lambda done, total, name: bar.update(task, completed=done, total=total, description=name),
         )
-    if json:
+    if as_json:
         print_json(report)
     else:
         _print(report, out)

@@ -44,6 +44,8 @@ def evaluate(
 
 def print_summary(evaluation: dict[str, Any]) -> None:
     """The figures of an evaluation that fit on a screen."""
+    from teamclone.evaluation.bootstrap import FEW_MATCHES
+
     splits = evaluation["splits"]
     print(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
     seen = evaluation["dataset"]["trained_on_before"]
@@ -62,6 +64,8 @@ def print_summary(evaluation: dict[str, Any]) -> None:
     print_table(["split", "matches", "rows", "", *(name for _, name, _ in figures)], rows, numeric=(1, 2, 4, 5, 6, 7))
     if any(len(split["matches"]) == 1 for split in splits.values()):
         print("No interval where a split has one match: matches, not rows, vary independently.")
+    if any(1 < len(split["matches"]) < FEW_MATCHES for split in splits.values()):
+        print(f"Intervals from fewer than {FEW_MATCHES} matches are too narrow: take them as the spread seen so far.")
     for name in [name for name in ("test", "unseen") if name in splits] or list(splits):
         split = splits[name]
         print()

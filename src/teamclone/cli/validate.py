@@ -39,7 +39,7 @@ def validate(
 
         for verdict in chain(
             validate_logs(logs, jobs=jobs, on_progress=on_progress) if logs else (),
-            *(validate_store(open_store(path), on_progress=on_progress) for path in stores),
+            *(validate_store(open_store(path), jobs=jobs, on_progress=on_progress) for path in stores),
         ):
             print(json.dumps(as_object(verdict), ensure_ascii=False) if as_json else line(verdict))
             total += 1

@@ -12,6 +12,8 @@ from teamclone.evaluation.metrics import Counts, Floats, Sums
 
 N_RESAMPLES = 1000
 LEVEL = 0.95
+FEW_MATCHES = 10
+"""Below, a percentile interval is clearly too narrow; that of two matches is just these two. Readers are told so."""
 
 
 def draw(n_matches: int, *, seed: int, n_resamples: int = N_RESAMPLES) -> Counts:

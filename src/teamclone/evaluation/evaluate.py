@@ -38,7 +38,7 @@ TURN_EDGES = np.arange(-181.5, 182.0, 3.0)
 """Bins of Fig. 6 in degrees; the one in the middle holds 0."""
 
 KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
-SPLITS = (Split.VALIDATION, Split.TEST, Split.UNSEEN)
+SPLITS = (Split.TEST, Split.UNSEEN, Split.VALIDATION)
 
 Progress = Callable[[int, int], None]
 """Called with rows done and rows in all."""
@@ -162,7 +162,7 @@ def evaluate(
     else:
         data = dataset if isinstance(dataset, Dataset) else open_dataset(dataset)
     foreign = own is None or data.id != own.id
-    splits = (Split.TRAIN, *SPLITS) if foreign else SPLITS
+    splits = (*SPLITS, Split.TRAIN) if foreign else SPLITS
     rows = {split: data.split(split) for split in splits}
     rows = {split: index for split, index in rows.items() if len(index)}
     if not rows:
@@ -202,6 +202,7 @@ def evaluate(
             "id": data.id,
             "team": data.meta["team"],
             "own": not foreign,
+            "baselines_counted_on": str(trained_on.path),
             "trained_on_before": sorted(match["match_id"] for match in data.matches if match["match_id"] in known),
             "matches": data.matches,
             "cleaning": _without_matches(data.meta.get("cleaning")),

@@ -26,6 +26,7 @@ _STAND_INS = {INK: "ink", MUTED: "muted", RULE: "rule", ACCENT: "accent", SECOND
 KIND_COLOURS = {"dash": "#3d85c6", "turn": "#dd8a1b", "kick": "#1f9e78", "tackle": "#c75b9b"}
 """Also legible where they cannot follow the page: in rasterised dots."""
 
+PERCENT = "\N{NARROW NO-BREAK SPACE}%"
 WIDTH = 7.4
 """Inches; the page scales it to its column."""
 
@@ -94,8 +95,8 @@ def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[s
     for axes, kind in zip(grid.flat, KINDS, strict=True):
         draw_pitch(axes, colour=MUTED, width=0.7)
         spots = np.asarray(points.get(kind, []), float).reshape(-1, 2)
-        crowd = float(np.clip(260.0 / max(len(spots), 1), 0.22, 0.85))
-        axes.scatter(*spots.T, s=5, color=KIND_COLOURS[kind], alpha=crowd, linewidths=0, zorder=2, rasterized=True)
+        crowd = float(np.clip(300.0 / max(len(spots), 1), 0.3, 0.9))
+        axes.scatter(*spots.T, s=5.5, color=KIND_COLOURS[kind], alpha=crowd, linewidths=0, zorder=2, rasterized=True)
         axes.set_title(f"{kind}  ·  {counts.get(kind, 0):,}", loc="center")
     return figure
 
@@ -109,7 +110,7 @@ def frequencies(counts: Mapping[str, int]) -> Figure:
     axes.barh(KINDS, values, color=[KIND_COLOURS[kind] for kind in KINDS], height=0.62)
     for place, value in enumerate(values):
         axes.annotate(
-            f"{value:,}  ({value / total:.2%})",
+            f"{value:,}  ({100 * value / total:.2f}{PERCENT})",
             (value, place),
             xytext=(5, 0),
             textcoords="offset points",
@@ -133,16 +134,11 @@ def turn_moments(edges: Sequence[float], counts: Sequence[int], *, zero: int, tu
     axes.stairs(counts, edges, fill=True, color=KIND_COLOURS["turn"])
     axes.set_yscale("log")
     top = max([*counts, 1])
-    axes.set_ylim(0.7, top * 6)
-    share = zero / turns if turns else 0.0
-    axes.annotate(
-        f"(turn 0), “nothing to do”: {zero:,} of {turns:,} turns, {share:.1%}",
-        (0, top),
-        xytext=(14, 9),
-        textcoords="offset points",
-        fontsize=8.5,
-        arrowprops={"arrowstyle": "-", "color": MUTED, "linewidth": 0.8},
-    )
+    axes.set_ylim(0.7, top * 8)
+    if zero:
+        label = f"exactly (turn 0), “nothing to do”: {zero:,} of {turns:,} turns, {100 * zero / turns:.2f}{PERCENT}"
+        axes.bar(0, zero, width=edges[1] - edges[0], color=ACCENT, label=label)
+        axes.legend(loc="upper right")
     axes.set_xlim(edges[0], edges[-1])
     axes.set_xticks(range(-180, 181, 45))
     axes.set_xlabel("turn moment, degrees")
@@ -182,7 +178,7 @@ def training_curves(history: Sequence[Mapping[str, Any]], *, best_epoch: int | N
     for axes in grid[-1]:
         axes.set_xlabel("epoch")
     if known:
-        grid.flat[0].legend()
+        grid.flat[0].legend(loc="upper right")
     return figure
 
 
@@ -214,7 +210,7 @@ def seen_unseen(splits: Mapping[str, Mapping[str, Any]]) -> Figure:
         axes.errorbar(points, place, xerr=bars, fmt="none", ecolor=MUTED, elinewidth=1.2, capsize=0)
         axes.scatter(points, place, c=colours, s=34, zorder=3)
         for x, y in zip(points, place, strict=True):
-            text = f"{x:.1%}" if key == "accuracy" else f"{x:.3f}"
+            text = f"{100 * x:.1f}{PERCENT}" if key == "accuracy" else f"{x:.3f}"
             axes.annotate(text, (x, y), xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8)
         axes.set_yticks(list(place), names)
         axes.set_ylim(len(names) - 0.45, -0.75)
@@ -224,7 +220,7 @@ def seen_unseen(splits: Mapping[str, Mapping[str, Any]]) -> Figure:
         axes.set_xlim(middle - 1.1 * spread, middle + 1.1 * spread)
         axes.xaxis.set_major_locator(MaxNLocator(nbins=3))
         if key == "accuracy":
-            axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1))
+            axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1, symbol=PERCENT))
         axes.tick_params(left=False)
         axes.spines["left"].set_visible(False)
     return figure
@@ -241,7 +237,7 @@ def opponents(rows: Sequence[Mapping[str, Any]]) -> Figure:
     axes.scatter(points, place, c=colours, s=32, zorder=3)
     axes.set_yticks(place, [f"{row['opponent']}  ·  {row['split']}, {row['matches']}" for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1))
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1, symbol=PERCENT))
     axes.set_xlabel("accuracy; the number beside the split counts matches")
     low, high = min(points - bars[0]), max(points + bars[1])
     margin = max(0.12 * (high - low), 0.004)
@@ -263,8 +259,8 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
         axes.set_ylim(-0.02, 1.02)
         axes.set_xticks([0, 0.25, 0.5, 0.75, 1])
         axes.set_yticks([0, 0.25, 0.5, 0.75, 1])
-        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=PERCENT))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=PERCENT))
     top = calibration["predicted_command"]
     left.plot(top["said"], top["came_true"], color=ACCENT, marker="o", markersize=4)
     left.set_title("the predicted command")

@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import RunError
-from teamclone.evaluation import figures, paper
+from teamclone.evaluation import bootstrap, figures, paper
 from teamclone.evaluation.evaluate import evaluate, load_evaluation, model_id, save_evaluation, write_json
 from teamclone.evaluation.latency import load_bench, measure_latency
 from teamclone.rcss.commands import CLONED_KINDS
@@ -42,19 +42,24 @@ PERCENT = {"accuracy", "balanced_accuracy", "ece"}
 
 def percent(value: float | None, digits: int = 1) -> str:
     """0.8455 as ``84.6 %``; what is undefined as a dash."""
-    return NOTHING if value is None else f"{100 * value:.{digits}f}\N{NARROW NO-BREAK SPACE}%"
+    return NOTHING if value is None else f"{number(100 * value, digits)}\N{NARROW NO-BREAK SPACE}%"
 
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number with so many decimals, thousands grouped; what is undefined as a dash."""
-    return NOTHING if value is None else f"{value:,.{digits}f}"
+    return NOTHING if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def points(value: float | None, digits: int = 1) -> str:
+    """A difference of accuracies, 0.012 as ``+1.2``."""
+    return NOTHING if value is None else f"{100 * value:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 3) -> Markup:
     """A figure and, small beside it, its interval."""
     if value is None or value["value"] is None:
         return Markup(NOTHING)
-    write = percent if kind == "percent" else number
+    write = {"percent": percent, "number": number, "points": points}[kind]
     text = Markup("{}").format(write(value["value"], digits))
     if value["low"] is None:
         return text
@@ -144,14 +149,14 @@ def listing(names: Sequence[str], most: int = 4) -> str:
 
 
 def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Accuracy of rules and clone, as bars from the bottom to the top."""
+    """Accuracy of rules and clone as rows, the best last, and the paper's for orientation."""
     section = evaluation["splits"][primary_split(evaluation)]
     names = {"majority": "most frequent command", "persistence": "repeat the last command", "markov": "Markov table"}
     rows = [
         {"name": names[key], "kind": "rule", **section["baselines"][key]["accuracy"]} for key in section["baselines"]
     ]
-    rows.sort(key=lambda row: row["value"] or 0.0)
     rows.append({"name": "this clone", "kind": "clone", **section["model"]["accuracy"]})
+    rows.sort(key=lambda row: row["value"] or 0.0)
     published = {"value": paper.PUBLISHED["accuracy"], "low": None, "high": None}
     rows.append({"name": f"the paper's clone of {paper.TEAM}", "kind": "paper", **published})
     return rows
@@ -169,7 +174,7 @@ def calibration_sentence(section: Mapping[str, Any]) -> str:
     )
 
 
-def commands(evaluation: Mapping[str, Any]) -> list[str]:
+def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
     """The commands that lead from match logs to this report; what the record does not know stands in capitals."""
     data, run = evaluation["dataset"], evaluation["run"]
     options = data["options"] or {}
@@ -183,12 +188,22 @@ def commands(evaluation: Mapping[str, Any]) -> list[str]:
     path = shlex.quote(run["path"])
     return [
         "teamclone ingest MATCHES --store STORE",
-        " ".join([*build, f"--out {shlex.quote(data['path'])}"]),
-        f"teamclone train DATASET --out {path}  # with the settings below",
+        _wrapped([*build, f"--out {shlex.quote(data['path'])}"]),
+        f"teamclone train {shlex.quote(str(trained_on))} --out {path}  # with the settings below",
         f"teamclone evaluate {path}{other} --checkpoint {run['checkpoint']}",
         f"teamclone bench {path}",
         f"teamclone report {path}",
     ]
+
+
+def _wrapped(parts: Sequence[str], width: int = 88) -> str:
+    """A long command over several lines, as a shell takes it."""
+    lines = [""]
+    for part in parts:
+        if lines[-1] and len(lines[-1]) + len(part) >= width:
+            lines.append("   ")
+        lines[-1] = f"{lines[-1]} {part}" if lines[-1] else part
+    return " \\\n".join(lines)
 
 
 def make_report(
@@ -280,7 +295,7 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
             "Two reliability diagrams: share that came true against probability said; the diagonal is perfect",
         ),
     }
-    compared = {name: splits[name]["model"] for name in ("validation", "test", "unseen", "train") if name in splits}
+    compared = {name: split["model"] for name, split in splits.items()}
     if len(compared) > 1:
         drawn["seen-unseen"] = (
             figures.seen_unseen(compared),
@@ -324,7 +339,7 @@ def render(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"percent": percent, "number": number, "figure": figure}
+    environment.filters |= {"percent": percent, "number": number, "figure": figure, "points": points}
     template = environment.from_string(resources.files(__package__).joinpath("report.html.j2").read_text("utf-8"))
     name = primary_split(evaluation)
     section = evaluation["splits"][name]
@@ -348,7 +363,8 @@ def render(
         calibration=calibration_sentence(section),
         cleaning=evaluation["dataset"]["cleaning"] or {},
         by_rows=split_by_rows(evaluation),
-        commands=commands(evaluation),
+        few_matches=bootstrap.FEW_MATCHES,
+        commands=commands(evaluation, trained_on=run.dataset_path),
         paper=paper,
         plots=_plots(evaluation, bench, history),
         settings=to_toml(run.config),

@@ -6,6 +6,7 @@ these statements as *marks*, each with the index of the frame that follows it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,9 +15,13 @@ from numpy.typing import NDArray
 
 from teamclone.logs import columns
 from teamclone.logs.match import Columns, Team, default_player_types, empty_columns
+from teamclone.rcss import player_types
 
 SCORES = tuple(column.name for column in columns.FRAMES if column.name.startswith(("left_", "right_")))
 """Columns of the scores in the order of a text log's ``(team ...)`` line and of ``TeamMark.scores``."""
+
+MAX_TYPES = 256
+"""A player's ``type`` is one byte. Servers use 18 types."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,10 +102,26 @@ def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:
     )
 
 
-def player_type_columns(types: Mapping[int, Mapping[str, float | str]]) -> Columns:
+def checked_type(fields: Mapping[str, float | str]) -> tuple[int, dict[str, float]]:
+    """Number (``id``) and known parameters of a player type.
+
+    Raises:
+        ValueError: the number is not in 0..255, or a parameter is no finite number.
+    """
+    known = {name: fields[name] for name in ("id", *player_types.FIELDS) if name in fields}
+    numbers = {name: float(value) for name, value in known.items()}
+    if not all(map(math.isfinite, numbers.values())):
+        raise ValueError("a parameter of a player type is no finite number")
+    number = numbers.pop("id", -1.0)
+    if number not in range(MAX_TYPES):
+        raise ValueError(f"player type {number:g}, expected 0 to {MAX_TYPES - 1}")
+    return int(number), numbers
+
+
+def player_type_columns(types: Mapping[int, Mapping[str, float]]) -> Columns:
     """The columns of ``player_types.FIELDS``, row = type id; what a log leaves out gets the server's default."""
     made = default_player_types(max(types, default=-1) + 1)
     for row, fields in types.items():
-        for name in made.keys() & fields.keys():
-            made[name][row] = float(fields[name])
+        for name, value in fields.items():
+            made[name][row] = value
     return made

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import columns
-from teamclone.logs.frames import TeamMark, final_teams, frame_columns, player_type_columns
+from teamclone.logs.frames import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
@@ -77,7 +77,7 @@ class _Parameters:
     dtype: np.dtype[np.void]
     scales: dict[str, float]
     added_later: frozenset[str]
-    """Took the place of spare fields: zero where the server did not know them yet, anything where a converter did not."""
+    """Took the place of spare fields: zero where the server did not know them, anything where a converter did not."""
 
     def unpack(self, content: bytes) -> dict[str, float]:
         row = np.frombuffer(content, self.dtype)[0]
@@ -247,7 +247,7 @@ def read_binary(data: bytes, *, path: Path | None = None) -> GameLog:
     complete = any(record.mode == _MSG and b"(result " in data[record.start : record.stop] for record in records.others)
     if version == 3:
         return _decode_fine(data, records, complete=complete, path=path)
-    return _decode_coarse(data, records, version=version, complete=complete)
+    return _decode_coarse(data, records, version=version, complete=complete, path=path)
 
 
 def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:
@@ -309,7 +309,7 @@ def _gather(data: bytes, offsets: list[int], dtype: np.dtype[np.void]) -> NDArra
     return structs
 
 
-def _decode_coarse(data: bytes, records: _Records, *, version: int, complete: bool) -> GameLog:
+def _decode_coarse(data: bytes, records: _Records, *, version: int, complete: bool, path: Path | None) -> GameLog:
     shows = _gather(data, records.shows, _SHOWINFO_T)
     players = empty_columns(columns.PLAYERS, len(shows), N_PLAYERS)
     pos = shows["pos"][:, 1:]
@@ -333,6 +333,7 @@ def _decode_coarse(data: bytes, records: _Records, *, version: int, complete: bo
         modes=modes,
         teams=teams,
         complete=complete,
+        path=path,
     )
 
 
@@ -358,8 +359,15 @@ def _decode_fine(data: bytes, records: _Records, *, complete: bool, path: Path |
         elif record.mode == _TEAM:
             _add_team(teams, record.frame, np.frombuffer(content, _TEAM_T).tolist())
         elif record.mode == _TYPE:
-            fields = _TYPE_PARAMETERS.unpack(content)
-            types[int(fields.pop("id"))] = fields
+            try:
+                number, fields = checked_type(_TYPE_PARAMETERS.unpack(content))
+            except ValueError as error:
+                text = f"record left out: {error}"
+                records.problems.append(
+                    Problem(code="bad-record", severity=Severity.WARNING, text=text, path=path, byte=record.start)
+                )
+            else:
+                types[number] = fields
         elif record.mode == _SERVER:
             params[_SERVER] = _SERVER_PARAMETERS.unpack(content)
         elif record.mode == _PLAYER:
@@ -380,6 +388,7 @@ def _decode_fine(data: bytes, records: _Records, *, complete: bool, path: Path |
         modes=modes,
         teams=teams,
         complete=complete,
+        path=path,
         types=types,
         server_params=params[_SERVER],
         player_params=params[_PLAYER],
@@ -387,8 +396,6 @@ def _decode_fine(data: bytes, records: _Records, *, complete: bool, path: Path |
 
 
 def _add_mode(modes: list[tuple[int, int]], frame: int, mode: int) -> None:
-    if mode not in _PLAYMODES:
-        mode = PlayMode.NULL
     if not modes or modes[-1][1] != mode:
         modes.append((frame, mode))
 
@@ -411,16 +418,22 @@ def _log(
     modes: Sequence[tuple[int, int]],
     teams: Sequence[TeamMark],
     complete: bool,
+    path: Path | None,
     types: Mapping[int, Mapping[str, float]] | None = None,
     server_params: Mapping[str, float] | None = None,
     player_params: Mapping[str, float] | None = None,
 ) -> GameLog:
     left, right = final_teams(teams)
+    known = [(frame, mode if mode in _PLAYMODES else int(PlayMode.NULL)) for frame, mode in modes]
+    if known != list(modes):
+        strange = next(mode for _, mode in modes if mode not in _PLAYMODES)
+        text = f"play mode {strange} is unknown, kept as 0"
+        records.problems.append(Problem(code="unknown-playmode", severity=Severity.WARNING, text=text, path=path))
     return GameLog(
         log_version=str(version),
         left=left,
         right=right,
-        frames=frame_columns(cycle=cycle.astype(np.int32), ball=ball, modes=modes, teams=teams),
+        frames=frame_columns(cycle=cycle.astype(np.int32), ball=ball, modes=known, teams=teams),
         players=players,
         # The types are not in versions 1 and 2; every player there counts as type 0, the server's default.
         player_types=player_type_columns(types or {0: {}}),

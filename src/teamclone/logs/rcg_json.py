@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import columns
-from teamclone.logs.frames import TeamMark, final_teams, frame_columns, player_type_columns
+from teamclone.logs.frames import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
-from teamclone.rcss.playmodes import BY_NAME
+from teamclone.rcss.playmodes import BY_NAME, PlayMode
 
 Record = dict[str, Any]
 
@@ -48,6 +48,18 @@ _NUMBERS: dict[str, str] = {
 }
 """Key of a player's number to its column. Servers leave out ``fdist`` and ``fdir``, converters write them."""
 _COUNTS: dict[str, str] = {kind.name.lower(): columns.counter_name(kind) for kind in columns.COUNTERS}
+_COLUMNS = (*_NUMBERS.values(), *_COUNTS.values())
+
+
+def _limits(dtype: np.dtype[Any]) -> tuple[float, float]:
+    info = np.finfo(dtype) if dtype.kind == "f" else np.iinfo(dtype)
+    return float(info.min), float(info.max)
+
+
+_LOWEST, _HIGHEST = np.array(
+    [_limits(np.dtype(column.dtype)) for name in _COLUMNS for column in columns.PLAYERS if column.name == name]
+).T
+"""What the columns hold, shapes (n_columns,). Nothing that a server writes comes near."""
 _QUALITY = {"l": 0, "h": 1}
 _SIDE = {"l": 1, "r": -1}
 _SLOT = {"l": -1, "r": 10}
@@ -99,7 +111,7 @@ def _records(data: bytes, *, start: int, first_line: int, reader: _Reader) -> It
                 reader.closed = False
                 reader.truncated_at = first_line + index
             else:
-                reader.bad("not JSON, left out", line=first_line + index)
+                reader.warn("bad-record", "not JSON, left out", line=first_line + index)
             continue
         yield first_line + index, record
 
@@ -131,7 +143,7 @@ class _Reader:
     players: Columns = field(init=False)
     modes: list[tuple[int, int]] = field(default_factory=list)
     teams: list[TeamMark] = field(default_factory=list)
-    types: dict[int, dict[str, float | str]] = field(default_factory=dict)
+    types: dict[int, dict[str, float]] = field(default_factory=dict)
     server_params: dict[str, float | str] = field(default_factory=dict)
     player_params: dict[str, float | str] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
@@ -140,28 +152,29 @@ class _Reader:
         self.cycle = np.zeros(self.capacity, np.int32)
         self.stoppage = np.zeros(self.capacity, np.int32)
         self.ball = np.full((self.capacity, 4), np.nan)
-        self.numbers = np.full((self.capacity, N_PLAYERS, len(_NUMBERS) + len(_COUNTS)), np.nan)
+        self.numbers = np.full((self.capacity, N_PLAYERS, len(_COLUMNS)), np.nan)
         self.players = empty_columns(columns.PLAYERS, self.capacity, N_PLAYERS)
 
-    def bad(self, text: str, *, line: int | None) -> None:
-        self.problems.append(
-            Problem(code="bad-record", severity=Severity.WARNING, text=text, path=self.path, line=line)
-        )
+    def warn(self, code: str, text: str, *, line: int | None) -> None:
+        self.problems.append(Problem(code=code, severity=Severity.WARNING, text=text, path=self.path, line=line))
 
     def take(self, record: Any, *, line: int | None) -> None:
         """Take one record in; one that is not as it should be becomes a problem."""
         try:
             kind, body = _open(record)
-            self._take(kind, body)
+            self._take(kind, body, line=line)
         except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
-            self.bad(f"record left out: {type(error).__name__} {error}", line=line)
+            self.warn("bad-record", f"record left out: {type(error).__name__} {error}", line=line)
 
-    def _take(self, kind: str, body: Any) -> None:
+    def _take(self, kind: str, body: Any, *, line: int | None) -> None:
         match kind:
             case "show":
                 self._show(body)
             case "playmode":
-                self.modes.append((self.n_frames, BY_NAME[body["mode"]]))
+                mode = BY_NAME.get(body["mode"], PlayMode.NULL)
+                self.modes.append((self.n_frames, mode))
+                if mode is PlayMode.NULL:
+                    self.warn("unknown-playmode", f"play mode {body['mode']!r} is unknown, kept as 0", line=line)
             case "team":
                 self.teams.append(_team_mark(self.n_frames, body))
             case "server_param":
@@ -169,7 +182,8 @@ class _Reader:
             case "player_param":
                 self.player_params = _params(body)
             case "player_type":
-                self.types[int(body["id"])] = _params(body)
+                number, fields = checked_type({"id": body["id"]} | _params(body))
+                self.types[number] = fields
             case "version":
                 self.version = str(body)
             case "header":
@@ -189,12 +203,15 @@ class _Reader:
             + [counts.get(key, np.nan) for counts in (player.get("count", player),) for key in _COUNTS]
             for player in players
         ]
+        found = np.array(values, np.float64)
+        if ((found < _LOWEST) | (found > _HIGHEST)).any() or np.abs(ball).max() > _HIGHEST.max():
+            raise ValueError("a number beyond what its column holds")
         frame = self.n_frames
         self.cycle[frame] = show["time"]
         self.stoppage[frame] = show.get("stime", 0)
         self.ball[frame] = ball
         self.numbers[frame] = np.nan
-        self.numbers[frame, slots] = np.array(values, np.float64)
+        self.numbers[frame, slots] = found
         self.players["view_quality"][frame, slots] = [_QUALITY.get(player.get("vq"), 255) for player in players]
         self.players["attention_side"][frame, slots] = [_SIDE.get(player.get("fside"), 0) for player in players]
         self.has_stime |= "stime" in show
@@ -203,7 +220,7 @@ class _Reader:
     def finish(self, *, log_version: str) -> GameLog:
         n_frames = self.n_frames
         players = {name: values[:n_frames] for name, values in self.players.items()}
-        for index, name in enumerate((*_NUMBERS.values(), *_COUNTS.values())):
+        for index, name in enumerate(_COLUMNS):
             values = self.numbers[:n_frames, :, index]
             known = np.isfinite(values)
             players[name][known] = values[known].astype(players[name].dtype)

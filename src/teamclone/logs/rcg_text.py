@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from teamclone.errors import LogError
 from teamclone.logs import scan
 from teamclone.logs.columns import COUNTERS, PLAYERS, counter_name
-from teamclone.logs.frames import TeamMark, final_teams, frame_columns, player_type_columns
+from teamclone.logs.frames import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.playmodes import BY_NAME
 
 _PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')
 _TEAM = re.compile(rb"\(team (\d+) (\S+) (\S+) (-?\d+) (-?\d+)(?: (\d+) (\d+) (\d+) (\d+))?\)\s*$")
 _PLAYMODE = re.compile(rb"\(playmode (\d+) (\w+)\)\s*$")
-_MAX_TYPES = 256
 _MAX_SCORE = 32767
 
 _WHAT = {
@@ -48,7 +47,7 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
     teams: list[TeamMark] = []
     server_params: dict[str, float | str] = {}
     player_params: dict[str, float | str] = {}
-    types: dict[int, dict[str, float | str]] = {}
+    types: dict[int, dict[str, float]] = {}
     finished = False
     odd: list[int] = []
     for index in np.setdiff1d(np.arange(1, len(starts)), shows, assume_unique=True):
@@ -87,12 +86,12 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
         elif line.startswith(b"(player_param "):
             player_params = parameters(line)
         elif line.startswith(b"(player_type "):
-            values = parameters(line)
-            number = values.get("id", -1.0)
-            if isinstance(number, float) and 0 <= number < _MAX_TYPES:
-                types[int(number)] = values
-            else:
+            try:
+                number, fields = checked_type(parameters(line))
+            except ValueError:
                 odd.append(int(index))
+            else:
+                types[number] = fields
         elif line.strip():
             odd.append(int(index))
     if odd:
@@ -100,7 +99,8 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
             Problem(
                 code="odd-line",
                 severity=Severity.WARNING,
-                text=f"{len(odd)} line(s) are no known record, the first is {data[starts[odd[0]] : stops[odd[0]]][:40]!r}",
+                text=f"{len(odd)} line(s) are no known record, the first is "
+                f"{data[starts[odd[0]] : stops[odd[0]]][:40]!r}",
                 path=path,
                 line=odd[0] + 1,
             )
@@ -123,7 +123,7 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
 def parameters(line: bytes) -> dict[str, float | str]:
     """Names and values of ``(server_param (name value)(name value)...)``; true and false become 1 and 0."""
     values: dict[str, float | str] = {}
-    for name, text, bare in _PARAMETER.findall(line):
+    for name, text, bare in _PARAMETER.findall(line, 1):
         if bare in {b"true", b"false"}:
             values[name.decode()] = float(bare == b"true")
             continue

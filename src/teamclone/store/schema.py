@@ -317,7 +317,7 @@ def markdown() -> str:
     lines = [
         "# Data model",
         "",
-        "<!-- Written by `teamclone.store.schema.markdown()`; a test compares. -->",
+        "<!-- Written by `teamclone.store.schema.markdown()`; `python -m` prints it, a test compares. -->",
         "",
         "The tables of a store, for `teamclone sql` and for any reader of its Parquet files or of `store.duckdb`.",
         "Positions are in metres in the server's frame: origin at the centre spot, +x towards the goal that the left",
@@ -349,3 +349,7 @@ def markdown() -> str:
         if entry.rows:
             lines += [", ".join(f"{number} `{word}`" if word else f"{number}" for number, word in entry.rows) + ".", ""]
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(markdown(), end="")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from teamclone.errors import LogError, StoreError
 from teamclone.logs import LogPair, Problem, Severity, find_matches, read_pair
 from teamclone.store import convert, schema
 from teamclone.store.checks import Finding, check_match
-from teamclone.store.store import Store
+from teamclone.store.store import Store, open_store
 from teamclone.store.workers import Died, run_tasks
+
+T = TypeVar("T", LogPair, tuple[str, str])
 
 OnProgress = Callable[[int, int], None]
 """Called with the matches that are done and their number."""
@@ -52,19 +55,32 @@ def validate_logs(
     Raises:
         UsageError: a path does not exist, or there is no log under any of them.
     """
-    pairs = find_matches(paths)
-    verdicts: dict[LogPair, Verdict] = {}
+    yield from _in_order(_validate_pair, find_matches(paths), jobs=jobs, on_progress=on_progress)
+
+
+def validate_store(
+    store: Store, *, jobs: int | None = None, on_progress: OnProgress | None = None
+) -> Iterator[Verdict]:
+    """A verdict on every match of a store: its tables can be read, have the rows they should, and break no rule."""
+    tasks = [(store.location, match_id) for match_id in store.match_ids()]
+    yield from _in_order(_validate_stored, tasks, jobs=jobs, on_progress=on_progress)
+
+
+def _in_order(
+    function: Callable[[T], Verdict], tasks: Sequence[T], *, jobs: int | None, on_progress: OnProgress | None
+) -> Iterator[Verdict]:
+    """The verdicts on all tasks, in their order, as soon as that allows."""
+    verdicts: dict[T, Verdict] = {}
     shown = 0
-    for pair, outcome in run_tasks(_validate_pair, pairs, jobs=jobs):
-        verdicts[pair] = (
-            Verdict(name=str(pair.path), error=f"{pair.path}: the process that read it was killed")
-            if isinstance(outcome, Died)
-            else outcome
-        )
+    for task, outcome in run_tasks(function, tasks, jobs=jobs):
+        if isinstance(outcome, Died):
+            name = str(task.path) if isinstance(task, LogPair) else str(task[-1])
+            outcome = Verdict(name=name, error=f"{name}: the process that checked it was killed, perhaps out of memory")
+        verdicts[task] = outcome
         if on_progress is not None:
-            on_progress(len(verdicts), len(pairs))
-        while shown < len(pairs) and pairs[shown] in verdicts:
-            yield verdicts[pairs[shown]]
+            on_progress(len(verdicts), len(tasks))
+        while shown < len(tasks) and tasks[shown] in verdicts:
+            yield verdicts[tasks[shown]]
             shown += 1
 
 
@@ -85,16 +101,9 @@ def _validate_pair(pair: LogPair) -> Verdict:
     )
 
 
-def validate_store(store: Store, *, on_progress: OnProgress | None = None) -> Iterator[Verdict]:
-    """A verdict on every match of a store: its tables can be read, have the rows they should, and break no rule."""
-    match_ids = store.match_ids()
-    for done, match_id in enumerate(match_ids, 1):
-        yield _validate_stored(store, match_id)
-        if on_progress is not None:
-            on_progress(done, len(match_ids))
-
-
-def _validate_stored(store: Store, match_id: str) -> Verdict:
+def _validate_stored(task: tuple[str, str]) -> Verdict:
+    location, match_id = task
+    store = open_store(location)
     try:
         tables = {table.name: store.read_table(match_id, table.name) for table in schema.MATCH_TABLES}
     except StoreError as error:

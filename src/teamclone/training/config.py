@@ -94,6 +94,8 @@ _AT_LEAST: dict[str, float] = {
     "train.max_minutes": 0,
 }
 _ABOVE_ZERO = ("train.learning_rate", "train.epsilon")
+_AT_MOST: dict[str, float] = {"train.learning_rate": 1000, "train.epsilon": 1000, "train.seed": 2**63 - 1}
+"""Beyond these PyTorch itself overflows."""
 
 
 def preset_names() -> list[str]:
@@ -250,7 +252,9 @@ def _scalar(key: str, value: Any, hint: Any) -> Any:
         raise UsageError(f"{key}: expected at least {_AT_LEAST[key]}, got {value}")
     if key in _ABOVE_ZERO and not value > 0:
         raise UsageError(f"{key}: expected a number above 0, got {value}")
-    if hint is float and value in (float("inf"),):
+    if not value <= _AT_MOST.get(key, value):
+        raise UsageError(f"{key}: expected at most {_AT_MOST[key]}, got {value}")
+    if value == float("inf"):
         raise UsageError(f"{key}: expected a finite number, got {value}")
     return value
 

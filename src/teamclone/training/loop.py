@@ -7,9 +7,9 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -63,12 +63,16 @@ def train(
     """
     from torch.utils.tensorboard import SummaryWriter
 
-    device, autocast = _resources(config.train)
+    device, precision = _resources(config.train)
     rows = dataset.split(Split.TRAIN)
     validation_rows = _validation_rows(config, dataset)
     if not len(rows):
         raise DatasetError(f"{dataset.path}: no training samples; make it again from more matches")
-    run = _continued(config, dataset, Path(run_folder)) if resume else create_run(Path(run_folder), config, dataset)
+    folder = Path(run_folder)
+    if resume:
+        run = _continued(config, dataset, folder)
+    else:
+        run = create_run(folder, config, dataset, device=device.type, precision=precision)
 
     torch.manual_seed(config.train.seed)
     model = Clone(config.model).to(device)
@@ -77,10 +81,13 @@ def train(
     if run.checkpoint_path(RESUME).is_file():
         done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
     else:
-        _fit_inputs(model, dataset, rows)
+        model.inputs.fit(model.inputs.project(state).cpu() for state in _whole_states(model, dataset, rows))
+        for _ in _whole_states(model, dataset, validation_rows):
+            pass  # Nothing may be missing there either.
     history = run.history()[:done]
     write_atomic(run.metrics_path, "".join(json.dumps(record) + "\n" for record in history).encode())
 
+    autocast = partial(torch.autocast, device.type, torch.bfloat16, enabled=precision == "bf16")
     loss_kind = cast(ParameterLoss, config.train.parameter_loss)
     batch_size = config.data.batch_size
     began = time.monotonic()
@@ -162,15 +169,15 @@ def _continued(config: Config, dataset: Dataset, folder: Path) -> Run:
     return open_run(folder)
 
 
-def _resources(config: TrainConfig) -> tuple[torch.device, Callable[[], AbstractContextManager[Any]]]:
-    """The device to train on, and a context that computes in the precision asked for."""
+def _resources(config: TrainConfig) -> tuple[torch.device, Literal["fp32", "bf16"]]:
+    """The device and the precision to train in, with ``auto`` resolved for this machine."""
     if config.threads:
         torch.set_num_threads(config.threads)
     if config.device == "cuda" and not torch.cuda.is_available():
         raise UsageError("train.device = cuda, but PyTorch finds no CUDA device here; use cpu or auto")
     device = torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
     bfloat = config.precision == "bf16" or (config.precision == "auto" and has_fast_bfloat16(device))
-    return device, lambda: torch.autocast(device.type, torch.bfloat16, enabled=bfloat)
+    return device, "bf16" if bfloat else "fp32"
 
 
 def has_fast_bfloat16(device: torch.device) -> bool:
@@ -221,31 +228,24 @@ def _batches(
             yield state.to(device), Target(*(tensor.to(device, non_blocking=True) for tensor in target))
 
 
-def _fit_inputs(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> None:
-    """Fit the input normalisation on training samples, and see that they hold every value that the inputs need."""
+def _whole_states(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> Iterator[State]:
+    """Samples evenly spread over ``rows``, in chunks, once it is sure that they hold every value the inputs need."""
     rows = rows[:: max(1, len(rows) // FIT_ROWS)]
-
-    def projected() -> Iterator[torch.Tensor]:
-        for start in range(0, len(rows), GATHER_ROWS):
-            part = rows[start : start + GATHER_ROWS]
-            state = dataset.state(part)
-            _check_present(dataset, part, state, model.inputs.channels)
-            yield model.inputs.project(state.to(device)).cpu()
-
     device = next(model.parameters()).device
-    model.inputs.fit(projected())
-
-
-def _check_present(dataset: Dataset, rows: NDArray[np.int64], state: State, channels: tuple[str, ...]) -> None:
-    values = {f"ball_{name}": state.ball[:, index] for index, name in enumerate(("x", "y", "vx", "vy"))}
-    values |= {name: state.players[..., CHANNEL[name]].sum(1) for name in channels}
-    for name, column in values.items():
-        if column.isnan().any():
-            match = dataset.matches[int(dataset.match(rows[column.isnan().numpy()][:1]))]
-            raise DatasetError(
-                f"{dataset.path}: match {match['match_id']} has no {name} in its log, which the model needs; "
-                "make the dataset without it, or train with features that do without"
-            )
+    for start in range(0, len(rows), GATHER_ROWS):
+        part = rows[start : start + GATHER_ROWS]
+        state = dataset.state(part)
+        values = {f"ball_{name}": state.ball[:, index] for index, name in enumerate(("x", "y", "vx", "vy"))}
+        values |= {name: state.players[..., CHANNEL[name]].sum(1) for name in model.inputs.channels}
+        for name, column in values.items():
+            lacking = part[column.isnan().numpy()]
+            if len(lacking):
+                match = dataset.matches[int(dataset.match(lacking[:1]))]
+                raise DatasetError(
+                    f"{dataset.path}: match {match['match_id']} has no {name} in its log, which the model needs; "
+                    "make the dataset without it"
+                )
+        yield state.to(device)
 
 
 def _mixed(seed: int, epoch: int) -> int:

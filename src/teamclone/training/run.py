@@ -176,8 +176,8 @@ def is_run(path: Path) -> bool:
     return (path / "environment.json").is_file()
 
 
-def create_run(path: Path, config: Config, dataset: Dataset) -> Run:
-    """Begin a run folder.
+def create_run(path: Path, config: Config, dataset: Dataset, *, device: str, precision: str) -> Run:
+    """Begin a run folder; ``device`` and ``precision`` are what ``auto`` came to on this machine.
 
     Raises:
         RunError: the folder holds something already.
@@ -186,12 +186,13 @@ def create_run(path: Path, config: Config, dataset: Dataset) -> Run:
         raise RunError(f"{path}: already holds a run; add --resume to go on with it, or choose another folder")
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise RunError(f"{path}: is not an empty folder; choose another one")
+    text = json.dumps(_environment(dataset) | {"device": device, "precision": precision}, indent=2) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         (temporary / "checkpoints").mkdir(parents=True)
         save_config(temporary, config)
-        write_atomic(temporary / "environment.json", json.dumps(_environment(dataset), indent=2).encode() + b"\n")
+        write_atomic(temporary / "environment.json", text.encode())
         temporary.rename(path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

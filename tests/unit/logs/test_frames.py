@@ -5,7 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teamclone.logs.frames import TeamMark, fill_marks, final_teams, frame_columns, player_type_columns, stoppage_of
+from teamclone.logs.frames import (
+    TeamMark,
+    checked_type,
+    fill_marks,
+    final_teams,
+    frame_columns,
+    player_type_columns,
+    stoppage_of,
+)
 from teamclone.rcss import player_types
 
 
@@ -70,7 +78,25 @@ def test_final_teams_keep_a_name_once_stated():
 
 
 def test_player_types_a_log_leaves_out_are_the_default():
-    made = player_type_columns({2: {"id": 2.0, "kick_rand": 0.2, "from_the_future": 7.0}})
+    number, fields = checked_type({"id": 2.0, "kick_rand": 0.2, "from_the_future": 7.0})
+    made = player_type_columns({number: fields})
     assert set(made) == set(player_types.FIELDS)
     assert made["kick_rand"].tolist() == [0.1, 0.1, 0.2]
     assert len(player_type_columns({})["kick_rand"]) == 0
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"id": "two"},
+        {"id": 256.0},
+        {"id": -1.0},
+        {"id": 0.5},
+        {"id": 0.0, "kick_rand": "0.x"},
+        {"id": 0.0, "kick_rand": np.nan},
+    ],
+)
+def test_player_types_without_sense_are_refused(fields):
+    with pytest.raises(ValueError):  # noqa: PT011  the caller names the record
+        checked_type(fields)

@@ -115,6 +115,13 @@ def test_state_keeps_its_sixteenth_bit(data: bytes):
     assert read_binary(bytes(patched)).players["state"][at] == 0x8009
 
 
+def test_an_unknown_play_mode_is_not_the_one_before(data: bytes):
+    mode = data.index(b"\x00\x05\x04") + 2 if data[:4] == b"ULG\x03" else data.index(b"\x04\x00HELIOS")
+    game = read_binary(data[:mode] + b"\x63" + data[mode + 1 :])
+    assert game.frames["playmode"][0] == PlayMode.NULL
+    assert [problem.code for problem in game.problems] == ["unknown-playmode"]
+
+
 def test_an_unknown_record_ends_the_reading(data: bytes):
     if data[:3] == b"ULG":
         game = read_binary(data + b"\x00\x63garbage")

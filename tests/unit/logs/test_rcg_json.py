@@ -142,7 +142,7 @@ def test_an_arm_that_points(records: list[dict]):
         b'{"show":{"time":99999999999,"ball":{"x":0,"y":0,"vx":0,"vy":0},"players":[]}}',
         b'{"show":{"time":2,"ball":{"x":0,"y":0,"vx":0,"vy":0},"players":[{"side":"l","unum":12}]}}',
         b'{"show":{"time":2,"ball":{"x":0,"y":0,"vx":0,"vy":0},"players":[{"side":"l","unum":1,"x":"far"}]}}',
-        b'{"playmode":{"time":1,"mode":"golden_goal"}}',
+        b'{"playmode":{"time":1,"mode":[]}}',
         b'{"team":{"time":1,"l":3}}',
         b'{"player_type":{"id":0,"kick_rand":[]}}',
         b'{"future":{}}',
@@ -160,6 +160,14 @@ def test_a_bad_record_is_left_out_and_named(data: bytes, damage: bytes):
     assert (problem.code, problem.line) == ("bad-record", at + 1)
     assert str(problem).startswith(f"odd.rcg: line {at + 1}: ")
     assert_same_frames(game, read_json(data))
+
+
+def test_an_unknown_play_mode_is_not_the_one_before(records: list[dict]):
+    show = next(record for record in records if "show" in record)
+    modes = [{"playmode": {"time": 1, "mode": mode}} for mode in ("play_on", "golden_goal")]
+    game = read_json(written([modes[0], show, modes[1], show]))
+    assert game.frames["playmode"].tolist() == [3, 0]
+    assert [(problem.code, problem.line) for problem in game.problems] == [("unknown-playmode", 4)]
 
 
 def test_a_killed_server_leaves_the_end_off(data: bytes):

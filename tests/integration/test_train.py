@@ -1,0 +1,270 @@
+"""Training as a whole, on a made dataset with something to learn."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
+from teamclone.dataset.reader import Dataset, open_dataset
+from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.training.config import Config, load_config, to_table
+from teamclone.training.loop import Progress, train
+from teamclone.training.run import Run, open_run
+from tests.synthetic import make_dataset
+
+TINY = (
+    "model.hidden=[16]",
+    "data.batch_size=64",
+    "data.batches_per_epoch=3",
+    "data.validation_batches=2",
+    "train.epochs=3",
+    "train.threads=1",
+    "train.precision=fp32",
+    "train.device=cpu",
+)
+TIMES = ("seconds", "samples_per_s")
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return open_dataset(make_dataset(tmp_path_factory.mktemp("data") / "ds", frames_per_match=50))
+
+
+def tiny(*overrides: str) -> Config:
+    return load_config("small", [*TINY, *overrides])
+
+
+def figures(run: Run) -> list[dict[str, Any]]:
+    """The history without what the clock says."""
+    return [{key: value for key, value in record.items() if key not in TIMES} for record in run.history()]
+
+
+def weights(run: Run) -> dict[str, bytes]:
+    return {name: run.checkpoint_path(name).read_bytes() for name in (*run.checkpoints(), "resume")}
+
+
+def stop_at(epoch: int, batch: int) -> Any:
+    def report(at: Progress) -> None:
+        if (at.epoch, at.batch) == (epoch, batch) and at.record is None:
+            raise KeyboardInterrupt
+
+    return report
+
+
+def test_learns_what_is_there_to_learn(tmp_path: Path) -> None:
+    dataset = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=600))
+    config = load_config("small", ["data.batch_size=128", "train.epochs=6", "train.threads=2"])
+    run = train(config, dataset, tmp_path / "run")
+    rows = dataset.split(Split.TEST)
+    kind = dataset.target(rows).kind
+    majority = int(kind.bincount().max()) / len(kind)
+    probabilities, parameters = run.load_model("best-accuracy").predict(dataset.state(rows))
+    accuracy = float((probabilities.argmax(1) == kind).float().mean())
+    assert accuracy > majority + 0.2
+    # The dash direction is minus the body's: better than always saying nothing.
+    dashes = kind == 0
+    truth = dataset.target(rows).parameters[dashes, 1]
+    assert (parameters[dashes, 1] - truth).abs().mean() < 0.8 * truth.abs().mean()
+
+
+def test_a_run_folder_is_complete(dataset: Dataset, tmp_path: Path) -> None:
+    run = train(tiny(), dataset, tmp_path / "run")
+    assert open_run(run.path).config == tiny()
+    history = run.history()
+    assert [record["epoch"] for record in history] == [1, 2, 3]
+    assert {"train_loss", "validation_accuracy", "validation_recall_dash", "validation_parameter_mae"} <= set(history[0])
+    assert {"last", "best-loss", "best-accuracy", "best-parameters", "best-recall-turn"} <= set(run.checkpoints())
+    assert list((run.path / "tensorboard").glob("events*"))
+    for best in run.best():
+        values = [record[best.figure] for record in history]
+        chosen = max(values) if "recall" in best.figure or "accuracy" in best.figure else min(values)
+        assert best.value == chosen
+        assert best.epoch == values.index(chosen) + 1
+
+
+def test_best_checkpoints_hold_the_weights_of_their_epoch(dataset: Dataset, tmp_path: Path) -> None:
+    run = train(tiny("train.learning_rate=0.3", "train.epochs=6"), dataset, tmp_path / "run")
+    best = {best.checkpoint: best for best in run.best()}["best-loss"]
+    assert best.epoch < 6, "the rate is meant to be too high"
+    short = train(tiny("train.learning_rate=0.3", f"train.epochs={best.epoch}"), dataset, tmp_path / "short")
+    assert run.checkpoint_path("best-loss").read_bytes() == short.checkpoint_path("last").read_bytes()
+
+
+def test_the_normalisation_is_fitted_on_training_samples_only(dataset: Dataset, tmp_path: Path) -> None:
+    model = train(tiny("train.epochs=1"), dataset, tmp_path / "run").load_model("last")
+    projected = model.inputs.project(dataset.state(dataset.split(Split.TRAIN)))
+    assert torch.allclose(model.features.normalisation.mean, projected.mean(0), atol=1e-5)
+    assert torch.allclose(model.features.normalisation.std, projected.std(0, correction=0), atol=1e-4)
+
+
+@pytest.mark.parametrize(("epoch", "batch"), [(1, 1), (2, 1), (3, 3)])
+def test_interrupted_and_resumed_is_as_never_interrupted(
+    dataset: Dataset, tmp_path: Path, epoch: int, batch: int
+) -> None:
+    whole = train(tiny("train.epochs=4"), dataset, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        train(tiny("train.epochs=4"), dataset, tmp_path / "run", on_progress=stop_at(epoch, batch))
+    assert len(open_run(tmp_path / "run").history()) == epoch - 1
+    resumed = train(tiny("train.epochs=4"), dataset, tmp_path / "run", resume=True)
+    assert figures(resumed) == figures(whole)
+    assert weights(resumed) == weights(whole)
+
+
+@pytest.mark.parametrize("optimiser", ["rmsprop", "adagrad"])
+def test_resume_with_every_optimiser(dataset: Dataset, tmp_path: Path, optimiser: str) -> None:
+    config = tiny(f"train.optimiser={optimiser}")
+    whole = train(config, dataset, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        train(config, dataset, tmp_path / "run", on_progress=stop_at(2, 2))
+    assert weights(train(config, dataset, tmp_path / "run", resume=True)) == weights(whole)
+
+
+@pytest.mark.parametrize("rest", ["", '{"epoch": 2, "tra', '{"epoch": 2, "train_loss": 9.0}\n'])
+def test_a_kill_between_the_files_of_an_epoch_is_made_good(dataset: Dataset, tmp_path: Path, rest: str) -> None:
+    """The last write of an epoch is what counts; whatever came before it is written again."""
+    whole = train(tiny(), dataset, tmp_path / "whole")
+    run = train(tiny("train.epochs=1"), dataset, tmp_path / "run")
+    with run.metrics_path.open("a") as file:
+        file.write(rest)
+    run.checkpoint_path("best-loss").write_bytes(b"half")
+    (run.path / "checkpoints" / ".last.safetensors.part").write_bytes(b"half")
+    resumed = train(tiny(), dataset, tmp_path / "run", resume=True)
+    assert figures(resumed) == figures(whole)
+    assert weights(resumed)["last"] == weights(whole)["last"]
+    assert len(resumed.metrics_path.read_text().splitlines()) == 3
+    assert ".last" not in resumed.checkpoints()
+
+
+def test_more_epochs_may_be_added(dataset: Dataset, tmp_path: Path) -> None:
+    train(tiny("train.epochs=2"), dataset, tmp_path / "run")
+    longer = train(tiny("train.epochs=4"), dataset, tmp_path / "run", resume=True)
+    assert figures(longer) == figures(train(tiny("train.epochs=4"), dataset, tmp_path / "whole"))
+    assert longer.config.train.epochs == 4
+
+
+def test_resume_refuses_another_dataset_or_other_settings(dataset: Dataset, tmp_path: Path) -> None:
+    run = train(tiny("train.epochs=1"), dataset, tmp_path / "run")
+    other = open_dataset(make_dataset(tmp_path / "other", frames_per_match=50, seed=9))
+    with pytest.raises(RunError, match=f"was trained on dataset {dataset.id}.* is {other.id}"):
+        train(tiny(), other, run.path, resume=True)
+    with pytest.raises(RunError, match=r"cannot resume with other settings \(train\.seed: 0 became 1\)"):
+        train(tiny("train.seed=1"), dataset, run.path, resume=True)
+    with pytest.raises(RunError, match="already holds a run; add --resume"):
+        train(tiny(), dataset, run.path)
+    with pytest.raises(RunError, match="no such folder"):
+        train(tiny(), dataset, tmp_path / "nowhere", resume=True)
+    assert len(run.history()) == 1
+
+
+def outcome(run: Run) -> tuple[Any, ...]:
+    """All that a setting can change: weights, figures, and how they were found."""
+    tensors = {name: tensor.tolist() for name, tensor in load_file(run.checkpoint_path("last")).items()}
+    return tensors, figures(run), run.environment["threads"], run.environment["precision"]
+
+
+CHANGES: dict[str, Sequence[str]] = {
+    "model.own_type": ["model.own_type=true"],
+    "model.all_types": ["model.all_types=kick"],
+    "model.hidden": ["model.hidden=[17]"],
+    "model.activation": ["model.activation=tanh"],
+    "data.batch_size": ["data.batch_size=32"],
+    "data.batches_per_epoch": ["data.batches_per_epoch=2"],
+    "data.validation_batches": ["data.validation_batches=1"],
+    "train.epochs": ["train.epochs=1"],
+    "train.optimiser": ["train.optimiser=rmsprop"],
+    "train.learning_rate": ["train.learning_rate=0.01"],
+    "train.betas": ["train.betas=[0.8, 0.9]"],
+    "train.epsilon": ["train.epsilon=0.1"],
+    "train.parameter_loss": ["train.parameter_loss=masked"],
+    "train.precision": ["train.precision=bf16"],
+    "train.threads": ["train.threads=2"],
+    "train.seed": ["train.seed=1"],
+    "train.max_minutes": ["train.max_minutes=1e-9"],
+}
+REFUSED = {"model.features", "train.device"}
+"""Only one value works here; the others are refused, which other tests show."""
+
+
+def test_every_setting_is_tried() -> None:
+    known = {f"{section}.{key}" for section, values in to_table(Config()).items() for key in values}
+    assert set(CHANGES) | REFUSED == known
+
+
+@pytest.fixture(scope="module")
+def usual(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, ...]:
+    return outcome(train(tiny("train.epochs=2"), dataset, tmp_path_factory.mktemp("usual") / "run"))
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_every_setting_has_an_effect(dataset: Dataset, tmp_path: Path, usual: tuple[Any, ...], key: str) -> None:
+    changed = train(tiny("train.epochs=2", *CHANGES[key]), dataset, tmp_path / "run")
+    assert outcome(changed) != usual
+
+
+def test_nothing_else_has_an_effect(dataset: Dataset, tmp_path: Path, usual: tuple[Any, ...]) -> None:
+    assert outcome(train(tiny("train.epochs=2"), dataset, tmp_path / "run")) == usual
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
+def test_cuda_is_not_replaced_silently(dataset: Dataset, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"train\.device = cuda, but PyTorch finds no CUDA device"):
+        train(tiny("train.device=cuda"), dataset, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_time_budget_ends_with_a_whole_epoch(dataset: Dataset, tmp_path: Path) -> None:
+    run = train(tiny("train.epochs=500", "train.max_minutes=0.01"), dataset, tmp_path / "run")
+    epochs = len(run.history())
+    assert 1 <= epochs < 500
+    assert sum(record["seconds"] for record in run.history()) < 2
+    resumed = train(tiny(f"train.epochs={epochs + 1}"), dataset, run.path, resume=True)
+    assert len(resumed.history()) == epochs + 1
+
+
+def test_divergence_is_told_and_the_last_checkpoint_kept(dataset: Dataset, tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"the loss is not a number in epoch \d+; .*smaller train\.learning_rate"):
+        train(tiny("train.learning_rate=1000", "train.epochs=20", f"model.hidden={[16] * 16}"), dataset, tmp_path / "run")
+    history = open_run(tmp_path / "run").history()
+    assert all(np.isfinite(record["train_loss"]) for record in history)
+
+
+def test_datasets_that_cannot_be_trained_on(dataset: Dataset, tmp_path: Path) -> None:
+    n = len(dataset)
+    for split, text in ((Split.TRAIN, "no validation samples"), (Split.VALIDATION, "no training samples")):
+        made = make_dataset(tmp_path / text, frames_per_match=50, **{"samples/split": np.full(n, int(split))})
+        with pytest.raises(DatasetError, match=text):
+            train(tiny(), open_dataset(made), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(("channel", "match"), [("vx", 0), ("ball_vx", 0), ("vx", 1)])
+def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, channel: str, match: int) -> None:
+    """In a match to train on, 0, and in one to validate on, 1."""
+    detail, ball = (dataset.frames[name].numpy().copy() for name in ("detail", "ball"))
+    frame = 7 + 50 * match
+    if channel == "vx":
+        detail[frame, :, [entry.name for entry in DETAIL_CHANNELS].index("vx")] = MISSING
+    else:
+        ball[frame, 2] = np.nan
+    changes = {"frames/detail": detail, "frames/ball": ball}
+    lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **changes))
+    with pytest.raises(DatasetError, match=rf"match 0{{15}}{match} has no {channel} in its log"):
+        train(tiny(), lacking, tmp_path / "run")
+
+
+def test_metrics_are_plain_json(dataset: Dataset, tmp_path: Path) -> None:
+    run = train(tiny("train.epochs=1"), dataset, tmp_path / "run")
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    for line in run.metrics_path.read_text().splitlines():
+        json.loads(line, parse_constant=refuse)

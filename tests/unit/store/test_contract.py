@@ -1,0 +1,261 @@
+"""What every store must do, whatever keeps its rows."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from teamclone.errors import StoreError, UsageError
+from teamclone.logs import Match, columns, read_match
+from teamclone.rcss import player_types
+from teamclone.rcss.playmodes import PlayMode
+from teamclone.store import Store, convert, schema
+from teamclone.store.status import FileStatus, Outcome
+from teamclone.store.store import Added
+
+
+def assert_same(read: np.ndarray, logged: np.ndarray, name: str) -> None:
+    assert read.dtype == logged.dtype, name
+    assert read.shape == logged.shape, name
+    np.testing.assert_array_equal(read, logged, err_msg=name)
+
+
+def test_a_match_comes_back_as_it_was(store: Store, any_match: Match) -> None:
+    assert store.add(any_match) is Added.ADDED
+    assert store.match_ids() == [any_match.match_id]
+    for table, logged, specs in (
+        ("frames", any_match.frames, columns.FRAMES),
+        ("player_states", any_match.players, columns.PLAYERS),
+        ("commands", any_match.commands, columns.COMMANDS),
+        ("events", any_match.events, columns.EVENTS),
+    ):
+        read = store.read_match_columns(any_match.match_id, table)
+        for spec in specs:
+            assert_same(read[spec.name], logged[spec.name], f"{table}.{spec.name}")
+    types = store.read_match_columns(any_match.match_id, "player_types")
+    for name in player_types.FIELDS:
+        assert_same(types[name], any_match.game.player_types[name], name)
+    assert store.read_parameters(any_match.match_id) == {
+        "server": any_match.game.server_params,
+        "player": any_match.game.player_params,
+    }
+
+
+def test_texts_come_back(store: Store, any_match: Match) -> None:
+    store.add(any_match)
+    texts = store.read_match_columns(any_match.match_id, "commands", columns=["text"])["text"]
+    assert list(texts) == [any_match.command_text(index) for index in range(len(any_match.commands["cycle"]))]
+    events = store.read_match_columns(any_match.match_id, "events", columns=["text"])["text"]
+    assert tuple(events) == any_match.event_texts
+
+
+def test_bytes_that_are_no_text_are_replaced(store: Store, match: Match) -> None:
+    log = match.log
+    assert log is not None
+    first = int(np.flatnonzero(log.commands["text_stop"] - log.commands["text_start"] > 3)[0])
+    start = int(log.commands["text_start"][first])
+    odd = dataclasses.replace(log, text=log.text[:start] + b"\xff\xfe" + log.text[start + 2 :])
+    store.add(dataclasses.replace(match, log=odd))
+    texts = store.read_match_columns(match.match_id, "commands", columns=["text"])["text"]
+    assert texts[first].startswith("\ufffd\ufffd")
+    assert texts[first + 1] == match.command_text(first + 1)
+
+
+def test_player_columns_name_their_players(store: Store, match: Match) -> None:
+    store.add(match)
+    read = store.read_match_columns(match.match_id, "player_states", columns=["unum", "side", "frame"])
+    assert list(read) == ["unum", "side", "frame"]
+    assert read["unum"].shape == (len(match.frames["cycle"]), 22)
+    assert read["unum"][0].tolist() == [*range(1, 12), *range(1, 12)]
+    assert read["side"][-1].tolist() == [1] * 11 + [-1] * 11
+    assert (read["frame"] == np.arange(len(match.frames["cycle"]))[:, None]).all()
+
+
+def test_the_row_of_a_match(store: Store, match: Match) -> None:
+    store.add(match)
+    (row,) = store.matches().to_pylist()
+    assert row["match_id"] == match.match_id
+    assert str(row["started_at"]) == "2026-11-22 11:31:17"
+    assert (row["left_name"], row["left_score"]) == ("HELIOS_base", 0)
+    assert (row["right_name"], row["right_score"]) == ("WEBase", 0)
+    assert row["n_frames"] == 199
+    assert row["n_play_on_frames"] == np.count_nonzero(match.frames["playmode"] == PlayMode.PLAY_ON)
+    assert row["n_commands"] == len(match.commands["cycle"])
+    assert row["complete"] is True
+    assert row["log_version"] == "6"
+    assert row["game_log"] == "20261122113117-HELIOS_base_0-vs-WEBase_0.rcg.gz"
+
+
+def test_penalties_and_absent_teams(store: Store, fixtures_dir: Path) -> None:
+    for folder in ("penalties", "onesided"):
+        store.add(read_match(next((fixtures_dir / folder).glob("*.rcg.gz"))))
+    shoot_out, onesided = store.matches().to_pylist()
+    assert (shoot_out["left_penalties_scored"], shoot_out["right_penalties_scored"]) == (0, 1)
+    assert onesided["right_name"] is None
+
+
+def test_a_command_log_alone(store: Store, fixtures_dir: Path, tmp_path: Path) -> None:
+    (path,) = (fixtures_dir / "v6").glob("*.rcl.gz")
+    alone = tmp_path / path.name
+    alone.write_bytes(path.read_bytes())
+    match = read_match(alone)
+    store.add(match)
+    (row,) = store.matches().to_pylist()
+    assert (row["n_frames"], row["game_log"], row["log_version"]) == (0, None, "none")
+    assert row["n_commands"] == len(match.commands["cycle"]) > 0
+    assert store.read_match_columns(match.match_id, "player_states", columns=["x"])["x"].shape == (0, 22)
+
+
+def test_sql_sees_what_numpy_sees(store: Store, match: Match) -> None:
+    store.add(match)
+    (row,) = store.sql(
+        "select count(*) as n, sum(count_dash) as dashes, count(pointto_x) as pointing, max(x)::double as x "
+        "from player_states join frames using (match_id, frame) "
+        "join playmodes on playmodes.id = playmode where playmodes.name = 'play_on'"
+    ).to_pylist()
+    playing = match.frames["playmode"] == PlayMode.PLAY_ON
+    assert row["n"] == playing.sum() * 22
+    assert int(row["dashes"]) == match.players["count_dash"][playing].sum()
+    assert row["pointing"] == np.isfinite(match.players["pointto_x"][playing]).sum()
+    assert row["x"] == match.players["x"][playing].max()
+
+
+def test_differences_cannot_overflow(store: Store, match: Match) -> None:
+    store.add(match)
+    assert store.sql("select min(unum - 11) as d, min(state - 100000) as e from player_states").to_pylist() == [
+        {"d": -10, "e": int(match.players["state"].min()) - 100000}
+    ]
+
+
+@pytest.mark.parametrize("filled", [False, True], ids=["empty", "filled"])
+def test_every_table_has_its_columns(store: Store, match: Match, filled: bool) -> None:
+    if filled:
+        store.add(match)
+    for table in schema.TABLES:
+        described = store.sql(f"describe {table.name}").to_pylist()
+        assert [(row["column_name"], row["column_type"].lower()) for row in described] == [
+            (field.name, {"real": "float"}.get(field.sql_type, field.sql_type)) for field in table.fields
+        ]
+        n_rows = store.sql(f"select count(*) as n from {table.name}").to_pylist()[0]["n"]
+        assert (n_rows > 0) == (filled or bool(table.rows)) or table.name == "problems"
+
+
+def test_keys_identify_rows(store: Store, any_match: Match) -> None:
+    store.add(any_match)
+    for table in schema.TABLES:
+        if table is schema.PROBLEMS:  # several may speak of one place
+            continue
+        key = ", ".join(f'"{name}"' for name in table.key)
+        assert store.sql(f"select {key} from {table.name} group by all having count(*) > 1").num_rows == 0, table.name
+
+
+@pytest.mark.parametrize(
+    ("query", "part"),
+    [
+        ("select nothing from frames", "nothing"),
+        ("select * from framez", "framez"),
+        ("selec 1", "syntax error"),
+        ("", "one SQL statement, got 0"),
+        ("select 1; select 2", "one SQL statement, got 2"),
+        ("drop view frames", "only reads"),
+        ("create table t as select 1", "only reads"),
+        ("insert into frames select * from frames", "only reads"),
+        ("copy frames to 'stolen.csv'", "only reads"),
+        ("explain analyze copy (select 1) to 'stolen.csv'", "only reads"),
+        ("attach 'other.db'", "only reads"),
+        ("select cast(name as int) from playmodes", "Could not convert"),
+        ("select * from match", "match"),
+    ],
+)
+def test_bad_queries_are_told_in_one_line(
+    store: Store, query: str, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    match = "local variables stay unseen"
+    assert match
+    with pytest.raises(UsageError) as caught:
+        store.sql(query)
+    assert part in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "stolen.csv").exists()
+
+
+def test_unknown_names_list_near_ones(store: Store, match: Match) -> None:
+    store.add(match)
+    with pytest.raises(UsageError, match="did you mean frames"):
+        store.read_table(match.match_id, "frame")
+    with pytest.raises(UsageError, match="did you mean ball_x"):
+        store.read_match_columns(match.match_id, "frames", columns=["ballx"])
+    with pytest.raises(StoreError, match=f"did you mean {match.match_id}"):
+        store.read_table(match.match_id[:-1], "frames")
+
+
+def test_adding_again_changes_nothing(store: Store, match: Match) -> None:
+    assert store.add(match) is Added.ADDED
+    assert store.add(match) is Added.UNCHANGED
+    assert store.match_ids() == [match.match_id]
+
+
+def test_commands_that_come_later_complete_a_match(store: Store, match: Match) -> None:
+    alone = dataclasses.replace(match, log=None, rcl_path=None)
+    assert store.add(alone) is Added.ADDED
+    assert store.matches()["n_commands"].to_pylist() == [0]
+    assert store.add(match) is Added.REPLACED
+    assert store.matches()["n_commands"].to_pylist() == [len(match.commands["cycle"])]
+    assert store.add(alone) is Added.UNCHANGED
+    assert store.matches()["n_commands"].to_pylist() == [len(match.commands["cycle"])]
+
+
+def test_removing(store: Store, match: Match) -> None:
+    store.add(match)
+    store.remove(match.match_id)
+    store.remove(match.match_id)
+    assert store.match_ids() == []
+    assert store.sql("select * from frames").num_rows == 0
+    assert store.add(match) is Added.ADDED
+
+
+def test_the_status_of_files_is_kept(store: Store) -> None:
+    odd = os.fsdecode(b"/logs/\xff 'quoted' \n\"name\".rcg")
+    statuses = [
+        FileStatus(
+            path=path,
+            outcome=Outcome.FAILED,
+            rows=0,
+            match_id=None,
+            error="nothing",
+            size=3,
+            mtime_ns=1_800_000_000_123_456_789,
+            content=None,
+        )
+        for path in ("/logs/a.rcg", odd)
+    ]
+    store.save_files(statuses)
+    store.save_files([dataclasses.replace(statuses[0], outcome=Outcome.OK)])
+    assert store.files() == sorted(
+        [dataclasses.replace(statuses[0], outcome=Outcome.OK), statuses[1]], key=lambda status: status.path
+    )
+
+
+def test_one_writer_at_a_time(store: Store) -> None:
+    with store.writing(), pytest.raises(StoreError, match="another ingest"), store.writing():
+        pass
+    with store.writing():
+        pass
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("20240718101530-A_2-vs-B_1.rcg.gz", "2024-07-18 10:15:30"),
+        ("202407181015-A_2-vs-B_1.rcg", "2024-07-18 10:15:00"),
+        ("20249918101530-A_2-vs-B_1.rcg", "None"),
+        ("incomplete.rcg", "None"),
+    ],
+)
+def test_the_start_is_told_by_the_name(name: str, expected: str) -> None:
+    assert str(convert.started_at(Path("logs") / name)) == expected

@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+from teamclone.dataset.reader import Dataset, open_dataset
+from teamclone.errors import RunError
+from teamclone.models.network import Clone
+from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
+from teamclone.training.config import Config, load_config
+from teamclone.training.run import create_run, open_run
+from tests.synthetic import make_dataset
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return open_dataset(make_dataset(tmp_path_factory.mktemp("data") / "ds", frames_per_match=4))
+
+
+@pytest.fixture
+def config() -> Config:
+    return load_config("small", ["model.hidden=[8]"])
+
+
+def test_a_run_folder_says_what_it_was_made_from(tmp_path: Path, dataset: Dataset, config: Config) -> None:
+    create_run(tmp_path / "run", config, dataset, device="cpu", precision="fp32")
+    run = open_run(tmp_path / "run")
+    assert run.config == config
+    assert run.dataset_path == dataset.path
+    assert run.dataset_id == dataset.id
+    assert run.environment["precision"] == "fp32"
+    assert run.history() == []
+    with pytest.raises(RunError, match="no checkpoint 'best-loss'; there are none yet"):
+        run.load_model()
+
+
+def test_folders_in_use_are_left_alone(tmp_path: Path, dataset: Dataset, config: Config) -> None:
+    create_run(tmp_path / "run", config, dataset, device="cpu", precision="fp32")
+    with pytest.raises(RunError, match="already holds a run; add --resume"):
+        create_run(tmp_path / "run", config, dataset, device="cpu", precision="fp32")
+    (tmp_path / "other").mkdir()
+    create_run(tmp_path / "other", config, dataset, device="cpu", precision="fp32")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.tex").touch()
+    with pytest.raises(RunError, match="is not an empty folder"):
+        create_run(tmp_path / "full", config, dataset, device="cpu", precision="fp32")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["full", "other", "run"]
+
+
+def test_missing_foreign_or_other_format(tmp_path: Path, dataset: Dataset, config: Config) -> None:
+    with pytest.raises(RunError, match="no such folder; make one with `teamclone train`"):
+        open_run(tmp_path / "nowhere")
+    with pytest.raises(RunError, match="not a run"):
+        open_run(tmp_path)
+    run = create_run(tmp_path / "run", config, dataset, device="cpu", precision="fp32")
+    environment = run.path / "environment.json"
+    environment.write_text(json.dumps(run.environment | {"format": 7}))
+    with pytest.raises(RunError, match="run of format 7, this version reads 1"):
+        open_run(run.path)
+    for text in ("{", "[]", "{}"):
+        environment.write_text(text)
+        with pytest.raises(RunError, match="not the description of a run"):
+            open_run(run.path)
+    environment.write_text(json.dumps(run.environment))
+    for text, answer in (("[model", "not TOML"), ("[model]\nwidth = 3\n", "no setting 'model.width'")):
+        (run.path / "config.toml").write_text(text)
+        with pytest.raises(RunError, match=answer):
+            open_run(run.path)
+
+
+def test_weights_survive_a_round_trip(tmp_path: Path, config: Config) -> None:
+    torch.manual_seed(0)
+    saved, loaded = Clone(config.model), Clone(config.model)
+    saved.inputs.fit([torch.rand(10, 119)])
+    save_weights(tmp_path / "w.safetensors", saved, epoch=3)
+    assert load_weights(tmp_path / "w.safetensors", loaded) == 3
+    for name, tensor in saved.state_dict().items():
+        assert torch.equal(tensor, loaded.state_dict()[name])
+    assert "features.normalisation.mean" in saved.state_dict()
+
+
+def test_damaged_and_foreign_checkpoints(tmp_path: Path, config: Config) -> None:
+    path = tmp_path / "w.safetensors"
+    model = Clone(config.model)
+    with pytest.raises(RunError, match="no such checkpoint"):
+        load_weights(path, model)
+    save_weights(path, Clone(load_config("small", ["model.hidden=[9]"]).model), epoch=1)
+    with pytest.raises(RunError, match=r"of another model than config\.toml says"):
+        load_weights(path, model)
+    whole = path.read_bytes()
+    for length in (0, 7, 100, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(RunError, match="not a checkpoint of teamclone"):
+            load_weights(path, model)
+
+
+@pytest.mark.parametrize("optimiser", [torch.optim.Adam, torch.optim.RMSprop, torch.optim.Adagrad])
+def test_the_optimiser_goes_on_as_if_never_stopped(
+    tmp_path: Path, config: Config, optimiser: type[torch.optim.Optimizer]
+) -> None:
+    def step(model: Clone, stepper: torch.optim.Optimizer) -> None:
+        stepper.zero_grad()
+        hidden = model.trunk(torch.linspace(-1, 1, 5 * 119).reshape(5, 119))
+        sum(output.square().sum() for output in model.head(hidden)).backward()
+        stepper.step()
+
+    torch.manual_seed(0)
+    model = Clone(config.model)
+    stepper = optimiser(model.parameters(), lr=0.01)  # type: ignore[call-arg]
+    for _ in range(3):
+        step(model, stepper)
+    save_progress(tmp_path / "r.safetensors", model, stepper, epoch=3)
+    other = Clone(config.model)
+    other_stepper = optimiser(other.parameters(), lr=0.01)  # type: ignore[call-arg]
+    assert load_progress(tmp_path / "r.safetensors", other, other_stepper) == 3
+    step(model, stepper)
+    step(other, other_stepper)
+    for name, tensor in model.state_dict().items():
+        assert torch.equal(tensor, other.state_dict()[name])

@@ -52,8 +52,7 @@ format: install
 	$(BIN)/ruff format .
 
 bench: install
-	$(BIN)/python benchmarks/reading.py $(MATCHES)
-	$(BIN)/python benchmarks/training.py $(MATCHES)
+	$(BIN)/python benchmarks/pipeline.py $(MATCHES)
 
 clean:
 	rm -rf $(VENV) $(DEMO) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

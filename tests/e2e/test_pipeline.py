@@ -41,7 +41,7 @@ def test_the_store_holds_the_six_matches(work: Path) -> None:
 def test_a_second_ingest_does_nothing(work: Path, samples_dir: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in (work / "store" / "matches").rglob("*")}
     again = json.loads(teamclone("ingest", samples_dir, "--store", work / "store", "--json").stdout)
-    assert again["added"] == 0
+    assert again["matches"] == {"added": 0, "replaced": 0, "unchanged": 6}
     assert {path: path.stat().st_mtime_ns for path in (work / "store" / "matches").rglob("*")} == before
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
+from tests.synthetic import make_dataset
 
 from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
 from teamclone.dataset.reader import Dataset, open_dataset
@@ -18,7 +19,6 @@ from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.training.config import Config, load_config, to_table
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, open_run
-from tests.synthetic import make_dataset
 
 TINY = (
     "model.hidden=[16]",
@@ -80,7 +80,9 @@ def test_a_run_folder_is_complete(dataset: Dataset, tmp_path: Path) -> None:
     assert open_run(run.path).config == tiny()
     history = run.history()
     assert [record["epoch"] for record in history] == [1, 2, 3]
-    assert {"train_loss", "validation_accuracy", "validation_recall_dash", "validation_parameter_mae"} <= set(history[0])
+    assert {"train_loss", "validation_accuracy", "validation_recall_dash", "validation_parameter_mae"} <= set(
+        history[0]
+    )
     assert {"last", "best-loss", "best-accuracy", "best-parameters", "best-recall-turn"} <= set(run.checkpoints())
     assert list((run.path / "tensorboard").glob("events*"))
     for best in run.best():
@@ -231,7 +233,9 @@ def test_a_time_budget_ends_with_a_whole_epoch(dataset: Dataset, tmp_path: Path)
 
 def test_divergence_is_told_and_the_last_checkpoint_kept(dataset: Dataset, tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"the loss is not a number in epoch \d+; .*smaller train\.learning_rate"):
-        train(tiny("train.learning_rate=1000", "train.epochs=20", f"model.hidden={[16] * 16}"), dataset, tmp_path / "run")
+        train(
+            tiny("train.learning_rate=1000", "train.epochs=20", f"model.hidden={[16] * 16}"), dataset, tmp_path / "run"
+        )
     history = open_run(tmp_path / "run").history()
     assert all(np.isfinite(record["train_loss"]) for record in history)
 

@@ -86,8 +86,8 @@ def _print(report: dict[str, Any], out: Path) -> None:
     print()
     share = report["idle"] / max(report["player_cycles"], 1)
     print(
-        f"{report['idle']:,} of {report['player_cycles']:,} player-cycles in play_on ({share:.1%}) have no body command, "
-        f"{report['frozen']:,} of them after a tackle or foul."
+        f"{report['idle']:,} of {report['player_cycles']:,} player-cycles in play_on ({share:.1%}) have no body "
+        f"command, {report['frozen']:,} of them after a tackle or foul."
     )
     print(f"{report['turn_zero']:,} rows are (turn 0).")
     if report["matches_without_team"]:

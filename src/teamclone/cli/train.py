@@ -42,15 +42,17 @@ def train(
     ] = None,
 ) -> None:
     """Train a clone on a dataset. The run folder is all that evaluation and export need."""
+    from teamclone.training.config import load_config, override
+
+    # Before PyTorch is imported: a wrong setting is told at once.
+    config = load_config(preset or "small", overrides or [])
+
     from teamclone.dataset.reader import open_dataset
     from teamclone.training import loop
-    from teamclone.training.config import load_config, override
     from teamclone.training.run import is_run, open_run
 
     if resume and preset is None:
         config = override(open_run(out).config, overrides or [])
-    else:
-        config = load_config(preset or "small", overrides or [])
     opened = open_dataset(dataset)
     try:
         with progress("train") as bar:

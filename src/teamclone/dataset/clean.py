@@ -250,7 +250,7 @@ def _frames(frames: Columns, players: Columns, kept: NDArray[np.int64], *, side:
     detail["flags"] = sum(
         (np.where((state & bits) != 0, flag, 0) for flag, bits in _FLAGS), np.zeros(state.shape, np.int64)
     )
-    executed = executed_kind(players)
+    executed = executed_kind(frames, players)
     last = np.concatenate([np.zeros_like(executed[:1]), executed[:-1]])
     detail["last_command"] = last[np.ix_(kept, axis)]
     own, other = ("left_score", "right_score") if side > 0 else ("right_score", "left_score")

@@ -131,10 +131,10 @@ def frequencies(counts: Mapping[str, int]) -> Figure:
 def turn_moments(edges: Sequence[float], counts: Sequence[int], *, zero: int, turns: int) -> Figure:
     """Fig. 6: turn moments in degrees on a logarithmic scale; ``zero`` of all ``turns`` are exactly (turn 0)."""
     figure, axes = _figure(2.7)
-    axes.stairs(counts, edges, fill=True, color=KIND_COLOURS["turn"])
+    # Limits first: a logarithmic axis cannot find its own where nothing was counted.
+    axes.set_ylim(0.7, max([*counts, 1]) * 8)
     axes.set_yscale("log")
-    top = max([*counts, 1])
-    axes.set_ylim(0.7, top * 8)
+    axes.stairs(counts, edges, fill=True, color=KIND_COLOURS["turn"])
     if zero:
         label = f"exactly (turn 0), “nothing to do”: {zero:,} of {turns:,} turns, {100 * zero / turns:.2f}{PERCENT}"
         axes.bar(0, zero, width=edges[1] - edges[0], color=ACCENT, label=label)

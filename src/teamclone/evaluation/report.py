@@ -361,7 +361,7 @@ def render(
         sentences=sentences(evaluation),
         ladder=ladder(evaluation),
         calibration=calibration_sentence(section),
-        cleaning=evaluation["dataset"]["cleaning"] or {},
+        cleaning={"rules": [], "player_cycles": 0} | (evaluation["dataset"]["cleaning"] or {}),
         by_rows=split_by_rows(evaluation),
         few_matches=bootstrap.FEW_MATCHES,
         commands=commands(evaluation, trained_on=run.dataset_path),

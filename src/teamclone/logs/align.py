@@ -39,7 +39,9 @@ def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, ha
 
 def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
     """Place on the player axis: 0..10 the left team's numbers 1..11, 11..21 the right team's; -1 for a coach."""
-    return np.where((unum > 0) & (side != 0), unum.astype(np.int64) - 1 + np.where(side < 0, 11, 0), -1)
+    slot: NDArray[np.int64] = unum.astype(np.int64) - 1 + np.where(side < 0, 11, 0)
+    slot[(unum == 0) | (side == 0)] = -1
+    return slot
 
 
 def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
@@ -59,21 +61,33 @@ def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_
     slot = slot_of(commands["side"][index], commands["unum"][index])
     key = commands["frame"][index].astype(np.int64) * N_PLAYERS + slot
     _, first = np.unique(key, return_index=True)  # the first of equal keys, in log order
-    return index[first]
+    kept: NDArray[np.int64] = index[first]
+    return kept
 
 
-def executed_kind(players: Columns) -> NDArray[np.uint8]:
+def follows(frames: Columns) -> NDArray[np.bool_]:
+    """Whether the next frame is the next step of the simulator, shape (n_frames,); False for the last frame.
+
+    At half time, and where a damaged log lost frames, the counters of the next frame speak of several cycles.
+    """
+    cycle, stoppage = np.diff(frames["cycle"]), np.diff(frames["stoppage"])
+    made = np.zeros(len(frames["cycle"]), np.bool_)
+    made[:-1] = (cycle == 1) | ((cycle == 0) & (stoppage == 1))
+    return made
+
+
+def executed_kind(frames: Columns, players: Columns) -> NDArray[np.uint8]:
     """The body command that the server executed on each frame, by the counters of the next one.
 
     Returns:
-        (n_frames, 22) CommandKind ids, 0 for none; the last frame has none. Where a kick and a two-leg dash were both
-        executed the kick is named.
+        (n_frames, 22) CommandKind ids, 0 for none; a frame without a direct successor has none. Where a kick and a
+        two-leg dash were both executed the kick is named.
     """
-    n_frames = len(players["state"])
-    kinds = np.zeros((n_frames, N_PLAYERS), np.uint8)
+    kinds: NDArray[np.uint8] = np.zeros(players["state"].shape, np.uint8)
     # Written last wins: kick goes above dash.
     for kind in sorted(BODY_KINDS, key=lambda kind: kind is CommandKind.KICK):
         counter = players[counter_name(kind)]
         rose = (counter[1:] > counter[:-1]) & (counter[:-1] >= 0)
         kinds[:-1][rose] = kind
+    kinds[~follows(frames)] = 0
     return kinds

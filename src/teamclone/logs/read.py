@@ -13,7 +13,7 @@ from typing import BinaryIO
 import numpy as np
 
 from teamclone.errors import LogError, UsageError
-from teamclone.logs.align import executed_kind, first_body_commands, frame_of, slot_of
+from teamclone.logs.align import executed_kind, first_body_commands, follows, frame_of, slot_of
 from teamclone.logs.columns import FRAMES, PLAYERS
 from teamclone.logs.match import (
     N_PLAYERS,
@@ -201,17 +201,17 @@ def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Ma
                 path=rcl.path,
             )
         )
-    for source in (rcg, rcl):
-        if source is not None and source.broken is not None:
-            problems.append(
-                Problem(
-                    code="truncated",
-                    severity=Severity.WARNING,
-                    text=f"{source.broken}; kept what could be read",
-                    path=source.path,
-                    byte=len(source.data),
-                )
-            )
+    problems += [
+        Problem(
+            code="truncated",
+            severity=Severity.WARNING,
+            text=f"{source.broken}; kept what could be read",
+            path=source.path,
+            byte=len(source.data),
+        )
+        for source in (rcg, rcl)
+        if source is not None and source.broken is not None
+    ]
     log = None
     if rcl is not None:
         log = _read_log(rcl, game, problems)
@@ -301,10 +301,10 @@ def _foreign(game: GameLog, log: CommandLog) -> bool:
     commands = log.commands
     index = first_body_commands(commands, game.frames["playmode"], play_on=PlayMode.PLAY_ON)
     frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
-    kind = executed_kind(game.players)
+    kind = executed_kind(game.frames, game.players)
     counted = (
         (game.frames["playmode"][frame] == PlayMode.PLAY_ON)
-        & (frame < len(kind) - 1)
+        & follows(game.frames)[frame]
         & (game.players["count_dash"][frame, slot] >= 0)
         & (game.players["state"][frame, slot] != 0)
     )

@@ -442,6 +442,7 @@ for _kind, _fewest, _most in (
     _FEWEST[_kind] = _fewest
     _MOST[_kind] = _most
 
+_CHANGE_VIEW = int(CommandKind.CHANGE_VIEW)
 _DASH = int(CommandKind.DASH)
 _SAY = int(CommandKind.SAY)
 _TACKLE = int(CommandKind.TACKLE)
@@ -465,6 +466,37 @@ def _kind_of(buffer: Bytes, start: int, stop: int) -> int:
         if same:
             return kind
     return _ILLEGAL
+
+
+_FLAGS = (b"on", b"off", b"true", b"false")
+_WIDTHS = (b"narrow", b"normal", b"wide")
+_QUALITIES = (b"high", b"low")
+
+
+def _alphabet(words: tuple[bytes, ...]) -> NDArray[np.uint8]:
+    """Words as rows of bytes, padded with zeros."""
+    rows = np.zeros((len(words), max(map(len, words)) + 1), np.uint8)
+    for row, word in zip(rows, words, strict=True):
+        row[: len(word)] = np.frombuffer(word, np.uint8)
+    return rows
+
+
+_FLAG_BYTES, _WIDTH_BYTES, _QUALITY_BYTES = _alphabet(_FLAGS), _alphabet(_WIDTHS), _alphabet(_QUALITIES)
+
+
+@njit(cache=True)
+def _word_of(buffer: Bytes, position: int, stop: int, words: NDArray[np.uint8]) -> int:
+    """The position behind the blanks and the one of ``words`` that stand here; -1 where none does."""
+    position = _blank(buffer, position, stop)
+    for row in range(len(words)):
+        at = position
+        index = 0
+        while words[row, index] != 0 and at < stop and buffer[at] == words[row, index]:
+            at += 1
+            index += 1
+        if words[row, index] == 0 and (at == stop or buffer[at] == 32 or buffer[at] == 9):
+            return at
+    return -1
 
 
 @njit(cache=True)
@@ -600,12 +632,19 @@ def _scan_command(
             fine = end - begin == 3
         else:
             count, after = _plain_numbers(buffer, begin, end, row, 0, most, args)
-            rest = end - after
-            fine = count >= _FEWEST[kind] and (rest == 0 or (kind == _TACKLE and count == 1))
+            last = after
+            if kind == _TACKLE and count == 1 and after < end:
+                last = _word_of(buffer, after, end, _FLAG_BYTES)
+            fine = count >= _FEWEST[kind] and last == end
             if fine:
                 begin = after
                 if kind == _DASH and count == 1:
                     args[1, row] = 0.0
+    elif of_player and kind == _CHANGE_VIEW:
+        last = _word_of(buffer, begin, end, _WIDTH_BYTES)
+        if 0 <= last < end:
+            last = _word_of(buffer, last, end, _QUALITY_BYTES)
+        fine = last == end
     if not fine:
         for index in range(4):
             args[index, row] = np.nan
@@ -624,7 +663,7 @@ _LINE_STRANGER = 3
 
 @njit(cache=True)
 def _stamp(buffer: Bytes, position: int, stop: int) -> tuple[int, int, int]:
-    """Reads ``TIME,STOP<tab>`` or ``TIME<tab>``: time, stoppage (-1 if absent), position behind (-1 if it is neither)."""
+    """Reads ``TIME,STOP<tab>`` or ``TIME<tab>``: time, stoppage (-1 if absent), position behind (-1 if neither)."""
     values = np.zeros(2, np.int64)
     values[1] = -1
     for index in range(2):

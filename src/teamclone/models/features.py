@@ -151,4 +151,4 @@ class _TypeParameters(nn.Module):
 
 
 FEATURES = {"paper": PaperFeatures}
-"""Sets of inputs by the name that ``model.features`` gives them."""
+"""The modules of `config.FEATURE_SETS`."""

@@ -2,44 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
 
+from teamclone.models.config import ModelConfig
 from teamclone.models.features import FEATURES, Features
 from teamclone.models.loss import LIMITS, Loss, ParameterLoss, clone_loss
 from teamclone.models.state import State, Target
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
 
-ACTIVATIONS: dict[str, type[nn.Module]] = {
-    "relu": nn.ReLU,
-    "gelu": nn.GELU,
-    "silu": nn.SiLU,
-    "tanh": nn.Tanh,
-}
-"""Hidden activations by the name that ``model.activation`` gives them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ModelConfig:
-    """What a network is built from; the paper's by default.
-
-    Attributes:
-        features: name of the set of inputs, see `FEATURES`.
-        own_type: add the acting player's type (127 inputs instead of 119).
-        all_types: groups of type parameters to add for all 22 players: movement, kick, stamina.
-        hidden: widths of the hidden layers.
-        activation: see `ACTIVATIONS`.
-    """
-
-    features: str = "paper"
-    own_type: bool = False
-    all_types: tuple[str, ...] = ()
-    hidden: tuple[int, ...] = (512, 256, 128)
-    activation: str = "relu"
+_ACTIVATIONS: dict[str, type[nn.Module]] = {"relu": nn.ReLU, "gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
 
 
 class Prediction(NamedTuple):
@@ -86,7 +61,7 @@ class Clone(nn.Module):
         widths = (len(self.features.names), *config.hidden)
         layers: list[nn.Module] = []
         for width_in, width_out in pairwise(widths):
-            layers += [nn.Linear(width_in, width_out), ACTIVATIONS[config.activation]()]
+            layers += [nn.Linear(width_in, width_out), _ACTIVATIONS[config.activation]()]
         self.trunk = nn.Sequential(*layers)
         self.head = PointHead(widths[-1])
         for module in self.modules():

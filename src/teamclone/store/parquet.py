@@ -115,8 +115,6 @@ class ParquetStore:
             if match_id not in (known := self.match_ids()):
                 raise StoreError(schema.unknown("match", match_id, tuple(known), where=str(self.root))) from None
             raise StoreError(f"{path}: is missing; {_remedy(path)}") from None
-        except KeyError as error:
-            raise StoreError(f"{path}: lacks a column ({_first_line(error)}); {_remedy(path)}") from None
         except (pa.ArrowException, OSError) as error:
             raise StoreError(f"{path}: cannot be read ({_first_line(error)}); {_remedy(path)}") from error
 
@@ -255,10 +253,13 @@ class ParquetStore:
             if row == (mark,):
                 return
         fresh = self._unfinished / f"{uuid.uuid4().hex}.duckdb"
-        with duckdb.connect(str(fresh)) as made:
-            for statement in wanted:
-                made.execute(statement)
-            made.execute(f"comment on view matches is '{mark}'")
+        # Made elsewhere: DuckDB cannot write to a path with a question mark in it.
+        with tempfile.TemporaryDirectory(prefix="teamclone-") as scratch:
+            with duckdb.connect(str(Path(scratch) / DATABASE)) as made:
+                for statement in wanted:
+                    made.execute(statement)
+                made.execute(f"comment on view matches is '{mark}'")
+            shutil.copyfile(Path(scratch) / DATABASE, fresh)
         fresh.replace(path)
 
 

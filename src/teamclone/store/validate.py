@@ -73,15 +73,17 @@ def _in_order(
     verdicts: dict[T, Verdict] = {}
     shown = 0
     for task, outcome in run_tasks(function, tasks, jobs=jobs):
-        if isinstance(outcome, Died):
-            name = str(task.path) if isinstance(task, LogPair) else str(task[-1])
-            outcome = Verdict(name=name, error=f"{name}: the process that checked it was killed, perhaps out of memory")
-        verdicts[task] = outcome
+        verdicts[task] = _dead(task) if isinstance(outcome, Died) else outcome
         if on_progress is not None:
             on_progress(len(verdicts), len(tasks))
         while shown < len(tasks) and tasks[shown] in verdicts:
             yield verdicts[tasks[shown]]
             shown += 1
+
+
+def _dead(task: LogPair | tuple[str, str]) -> Verdict:
+    name = str(task.path) if isinstance(task, LogPair) else task[1]
+    return Verdict(name=name, error=f"{name}: the process that checked it was killed, perhaps out of memory")
 
 
 def _validate_pair(pair: LogPair) -> Verdict:

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from teamclone.errors import UsageError
-from teamclone.models.features import FEATURES
-from teamclone.models.network import ACTIVATIONS, ModelConfig
+from teamclone.models.config import ACTIVATIONS, FEATURE_SETS, ModelConfig
 from teamclone.rcss.player_types import GROUPS
 
 
@@ -75,8 +74,8 @@ MAY_CHANGE = ("train.epochs", "train.max_minutes")
 """Settings that a resumed run may have otherwise than before: they do not change what an epoch does."""
 
 _CHOICES: dict[str, tuple[str, ...]] = {
-    "model.features": tuple(FEATURES),
-    "model.activation": tuple(ACTIVATIONS),
+    "model.features": FEATURE_SETS,
+    "model.activation": ACTIVATIONS,
     "model.all_types": tuple(GROUPS),
     "train.optimiser": ("adam", "rmsprop", "adagrad"),
     "train.parameter_loss": ("paper", "masked"),

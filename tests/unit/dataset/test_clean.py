@@ -220,7 +220,7 @@ def _agreement(match: Any, shift: int) -> float:
     slot = slot_of(commands["side"], commands["unum"])[first]
     inside = (frame >= 0) & (frame < len(mode) - 1)
     inside[inside] &= mode[frame[inside]] == PlayMode.PLAY_ON
-    executed = executed_kind(match.players)[frame[inside], slot[inside]]
+    executed = executed_kind(match.frames, match.players)[frame[inside], slot[inside]]
     return float((executed == commands["kind"][first][inside]).mean())
 
 

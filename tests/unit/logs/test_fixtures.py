@@ -238,7 +238,7 @@ def executed_share(match: Match) -> tuple[float, int]:
     # At half time the next frame also shows what was commanded without a frame.
     followed = np.append(np.diff(frames["cycle"]) <= 1, False)
     use = (frames["playmode"][frame] == PlayMode.PLAY_ON) & followed[frame]
-    same = executed_kind(match.players)[frame, slot] == commands["kind"][index]
+    same = executed_kind(match.frames, match.players)[frame, slot] == commands["kind"][index]
     return float(same[use].mean()), int(use.sum())
 
 

@@ -5,7 +5,9 @@ from itertools import pairwise
 import pytest
 import torch
 
-from teamclone.models.network import ACTIVATIONS, Clone, ModelConfig, parameter_count
+from teamclone.models.config import ACTIVATIONS, FEATURE_SETS, ModelConfig
+from teamclone.models.features import FEATURES
+from teamclone.models.network import Clone, parameter_count
 from teamclone.models.state import CHANNEL, State, Target
 from teamclone.rcss.player_types import FIELDS
 
@@ -53,6 +55,10 @@ def test_rows_do_not_depend_on_each_other() -> None:
         alone = model.predict(State(*(tensor[row : row + 1] for tensor in state)))
         for one, all_ in zip(alone, whole, strict=True):
             assert torch.allclose(one[0], all_[row], atol=1e-2, rtol=1e-3)
+
+
+def test_every_set_of_inputs_that_may_be_asked_for_exists() -> None:
+    assert tuple(FEATURES) == FEATURE_SETS
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS)

@@ -86,7 +86,7 @@ def test_a_store_may_be_moved_anywhere(filled: Path, match: Match, name: str) ->
     with store.writing():
         pass
     with duckdb.connect(str(moved / "store.duckdb"), read_only=True) as other:
-        assert other.sql("select count(*) from frames join playmodes on id = playmode").fetchone() == (n_frames,)
+        assert other.execute("select count(*) from frames join playmodes on id = playmode").fetchone() == (n_frames,)
 
 
 def test_the_database_is_left_alone_when_it_is_right(filled: Path, match: Match) -> None:
@@ -107,7 +107,7 @@ def test_an_empty_store_has_a_database(tmp_path: Path) -> None:
     with create_store(tmp_path / "store").writing():
         pass
     with duckdb.connect(str(tmp_path / "store" / "store.duckdb"), read_only=True) as other:
-        assert other.sql("select * from player_states").fetchall() == []
+        assert other.execute("select * from player_states").fetchall() == []
 
 
 def test_a_read_only_store_can_be_asked(filled: Path) -> None:
@@ -165,7 +165,7 @@ def test_damaged_files_are_named(filled: Path, match: Match) -> None:
     with pytest.raises(StoreError, match=r"frames\.parquet: is missing"):
         store.read_table(match.match_id, "frames")
     pq.write_table(store.read_table(match.match_id, "events"), folder / "frames.parquet")
-    with pytest.raises(StoreError, match=r"frames\.parquet: lacks a column"):
+    with pytest.raises(StoreError, match=r"frames\.parquet: cannot be read .*FieldRef"):
         store.read_table(match.match_id, "frames")
 
 

@@ -59,7 +59,12 @@ def test_presets_say_every_setting_and_survive_a_round_trip(name: str) -> None:
 def test_any_config_survives_a_round_trip(rate: float, seed: int, hidden: list[int], own: bool) -> None:
     config = load_config(
         "small",
-        [f"train.learning_rate={rate}", f"train.seed={seed}", f"model.hidden={hidden}", f"model.own_type={own}".lower()],
+        [
+            f"train.learning_rate={rate}",
+            f"train.seed={seed}",
+            f"model.hidden={hidden}",
+            f"model.own_type={own}".lower(),
+        ],
     )
     assert config.train.learning_rate == rate
     assert config.model.hidden == tuple(hidden)

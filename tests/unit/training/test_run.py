@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import RunError
@@ -12,7 +13,6 @@ from teamclone.models.network import Clone
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import Config, load_config
 from teamclone.training.run import create_run, open_run
-from tests.synthetic import make_dataset
 
 
 @pytest.fixture(scope="module")

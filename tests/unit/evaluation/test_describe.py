@@ -1,0 +1,129 @@
+"""From an outcome to the document that report and command line read."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from teamclone.evaluation import metrics
+from teamclone.evaluation.baselines import Baselines
+from teamclone.evaluation.evaluate import describe, write_json
+from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.report import listing, number, percent, points, sentences
+
+MATCHES = [{"match_id": f"m{index}", "opponent": "Red" if index < 2 else "Blue"} for index in range(12)]
+BASELINES = Baselines(transitions=np.full((5, 4), 9), parameters=np.full(6, 5.0))
+
+
+def outcome(n: int = 600, n_matches: int = 3) -> Outcome:
+    generator = np.random.default_rng(8)
+    kind = generator.choice(3, n, p=[0.6, 0.35, 0.05])  # no tackle occurs
+    issued = np.full((n, 6), np.nan, np.float32)
+    issued[kind == 0, 0] = 60
+    return Outcome(
+        probabilities=(0.2 * generator.dirichlet(np.ones(4), n) + 0.8 * np.eye(4)[kind]).astype(np.float32)[
+            generator.permutation(n)
+        ],
+        parameters=np.full((n, 6), 50, np.float32),
+        kind=kind,
+        issued=issued,
+        last=kind[generator.permutation(n)],
+        match=np.sort(generator.integers(0, n_matches, n)),
+        position=np.zeros((n, 2), np.float32),
+    )
+
+
+def test_figures_are_those_of_the_metrics() -> None:
+    made = outcome()
+    section = describe(made, baselines=BASELINES, matches=MATCHES)
+    scores = metrics.scores(metrics.measure(made)[1].total())
+    for name, value in section["model"].items():
+        assert value["value"] == pytest.approx(float(getattr(scores, name)))
+        assert value["low"] < value["value"] < value["high"]
+    assert np.array(section["confusion"]).sum() == section["rows"] == 600
+    assert section["commands"]["tackle"]["recall"]["value"] is None
+    dash = section["parameters"]["dash_power"]
+    assert dash["mean"] == {"value": 10.0, "low": 10.0, "high": 10.0}
+    assert (dash["median"], dash["constant"]["mean"], dash["constant"]["guess"]) == (10.0, 55.0, 5.0)
+    assert section["parameters"]["kick_power"]["mean"]["value"] is None
+    assert sum(match["rows"] for match in section["matches"]) == 600
+
+
+def test_gain_over_a_baseline_is_paired() -> None:
+    section = describe(outcome(), baselines=BASELINES, matches=MATCHES)
+    for row in section["baselines"].values():
+        gain = row["accuracy_gain"]
+        assert gain["value"] == pytest.approx(section["model"]["accuracy"]["value"] - row["accuracy"]["value"])
+        assert gain["low"] <= gain["value"] <= gain["high"]
+        skill = 1 - section["model"]["cross_entropy"]["value"] / row["cross_entropy"]["value"]
+        assert row["cross_entropy_skill"]["value"] == pytest.approx(skill)
+
+
+def test_opponents_are_the_split_in_parts() -> None:
+    made = outcome()
+    section = describe(made, baselines=BASELINES, matches=MATCHES)
+    by_name = {row["opponent"]: row for row in section["opponents"]}
+    assert by_name["Red"]["matches"] == 2
+    assert by_name["Blue"]["matches"] == 1
+    assert by_name["Blue"]["accuracy"]["low"] is None
+    red = made.rows(made.match < 2)
+    assert by_name["Red"]["accuracy"]["value"] == pytest.approx((red.probabilities.argmax(1) == red.kind).mean())
+
+
+def test_one_match_has_no_interval() -> None:
+    section = describe(outcome(n_matches=1), baselines=BASELINES, matches=MATCHES)
+    assert all(value["low"] is None and value["high"] is None for value in section["model"].values())
+    assert section["baselines"]["markov"]["accuracy_gain"]["low"] is None
+
+
+def test_the_same_seed_gives_the_same_document(tmp_path) -> None:
+    made = outcome(n_matches=12)
+    documents = [describe(made, baselines=BASELINES, matches=MATCHES, seed=seed) for seed in (1, 1, 2)]
+    assert documents[0] == documents[1] != documents[2]
+    write_json(tmp_path / "a.json", documents[0])
+    assert json.loads((tmp_path / "a.json").read_text()) == documents[0]
+
+
+def document(**splits: Outcome) -> dict:
+    sections = {name: describe(made, baselines=BASELINES, matches=MATCHES) for name, made in splits.items()}
+    return {"splits": sections, "dataset": {"team": "HELIOS_base", "options": {"split": "match"}}}
+
+
+def test_the_headline_claims_only_what_the_numbers_hold() -> None:
+    evaluation = document(test=outcome())
+    text = " ".join(sentences(evaluation))
+    assert "In 3 matches it never saw" in text
+    model = evaluation["splits"]["test"]["model"]["accuracy"]
+    assert percent(model["value"]) in text
+    assert "95 % interval" in text
+    for baseline in evaluation["splits"]["test"]["baselines"].values():
+        baseline["accuracy_gain"] = {"value": 0.031, "low": 0.02, "high": 0.04}
+    assert "3.1 points above the strongest rule" in " ".join(sentences(evaluation))
+    for baseline in evaluation["splits"]["test"]["baselines"].values():
+        baseline["accuracy_gain"] = {"value": 0.01, "low": -0.01, "high": 0.03}
+    assert "not certain" in " ".join(sentences(evaluation))
+    for baseline in evaluation["splits"]["test"]["baselines"].values():
+        baseline["accuracy_gain"] = {"value": -0.01, "low": None, "high": None}
+    assert "does not beat" in " ".join(sentences(evaluation))
+
+
+def test_the_headline_names_unseen_opponents_and_a_leaking_split() -> None:
+    evaluation = document(test=outcome(), unseen=outcome())
+    assert "Against Red and Blue, never met in training" in " ".join(sentences(evaluation))
+    assert "the same." in " ".join(sentences(evaluation))
+    evaluation["dataset"]["options"]["split"] = "rows"
+    assert "never saw" not in " ".join(sentences(evaluation))
+    assert "trained on" in " ".join(sentences(evaluation))
+
+
+def test_numbers_as_readers_see_them() -> None:
+    assert percent(0.8456) == "84.6\N{NARROW NO-BREAK SPACE}%"
+    assert percent(None) == number(None) == points(None) == "\N{EN DASH}"
+    assert number(1234.5678, 1) == "1,234.6"
+    assert points(-0.015) == "\N{MINUS SIGN}1.5"
+    assert points(0.0812) == "+8.1"
+    assert listing(["A"]) == "A"
+    assert listing(["A", "B", "C"]) == "A, B and C"
+    assert listing(["A", "B", "C", "D", "E", "F"]) == "A, B, C, D and 2 more"

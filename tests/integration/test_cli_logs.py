@@ -152,19 +152,22 @@ def test_info(logs: Path, samples_dir: Path, tmp_path: Path) -> None:
     assert "empty.rcg: is empty" in one_line(done)
     found = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(found) == 5
-    killed, shoot_out, *samples = found
+    (killed,) = [match for match in found if "killed" in match["path"]]
+    (shoot_out,) = [match for match in found if "penalties" in match["path"]]
+    samples = [match for match in found if WEBASE in match["path"]]
+    assert len(samples) == 2, "in the folder, and named by its command log"
     assert killed["complete"] is False
     assert {problem["code"] for problem in killed["problems"]} >= {"truncated", "incomplete"}
     truncated = next(problem for problem in killed["problems"] if problem["code"] == "truncated")
     assert (truncated["severity"], truncated["byte"]) == ("warning", 1017410)
     assert truncated["path"].endswith("incomplete.rcg.gz")
-    assert shoot_out["right"] == {"name": "HELIOS_B", "score": 0, "penalties_scored": 1, "penalties_missed": 0}
+    assert shoot_out["right"] == {"name": "HELIOS_B", "score": 0, "penalties_scored": 1, "penalties_missed": 1}
     match = read_match(samples_dir / f"{WEBASE}.rcg.xz")
     of_players = match.commands["kind"][match.commands["unum"] > 0]
-    for sample in (sample for sample in samples if WEBASE in sample["path"]):
+    for sample in samples:
         assert sample["path"].endswith(".rcg.xz")
         assert sample["log_version"] == "6"
-        assert sample["left"]["name"], sample["left"]["score"] == ("WEBase", 1)
+        assert (sample["left"]["name"], sample["left"]["score"]) == ("WEBase", 1)
         assert (sample["right"]["name"], sample["right"]["score"]) == ("HELIOS_base", 8)
         assert (sample["frames"], sample["play_on_frames"]) == (2509, 1772)
         assert sample["problems"] == []
@@ -221,3 +224,20 @@ def test_ingest_of_bad_files_fails_but_keeps_the_rest(tmp_path: Path, fixtures_d
     assert "letter.rcg: is no game log" in one_line(strict)
     (tmp_path / "store" / "store.json").write_text('{"kind": "teamclone store", "format": 99, "teamclone": "9.9"}')
     assert "format 99" in one_line(run("ingest", tmp_path / "logs", "--store", tmp_path / "store", code=1))
+
+
+@pytest.mark.parametrize("name", ["info", "ingest", "matches", "sql", "validate"])
+def test_every_option_is_documented(name: str) -> None:
+    from typer.main import get_command
+
+    from teamclone.cli.app import app
+    from teamclone.store.checks import CHECKS
+
+    page = (Path(__file__).resolve().parents[2] / "docs" / f"{name}.md").read_text()
+    command = get_command(app).commands[name]  # type: ignore[attr-defined]
+    for parameter in command.params:
+        for option in parameter.opts:
+            assert not option.startswith("--") or f"`{option}" in page, option
+    if name == "validate":
+        for check in CHECKS:
+            assert f"| `{check.name}` | {check.about} |" in page

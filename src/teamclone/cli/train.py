@@ -73,7 +73,12 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Progress], None]:
         nonlocal text
         if at.record is not None:
             text = _line(at)
-        update(task, total=at.epochs * at.batches, completed=(at.epoch - 1) * at.batches + at.batch, description=text)
+        update(
+            task,
+            total=at.epochs * at.batches,
+            completed=(at.epoch - 1) * at.batches + at.batch,
+            description=f"epoch {at.epoch}/{at.epochs}  {text}",
+        )
 
     return report
 

@@ -23,6 +23,7 @@ from teamclone.evaluation import bootstrap, metrics
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
+from teamclone.training.checkpoint import write_atomic
 
 if TYPE_CHECKING:
     from teamclone.models.network import Clone
@@ -449,9 +450,7 @@ def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
     """Write a document so that a reader sees the old one or the new one; lists stay on one line."""
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(_layout(document) + "\n", encoding="utf-8")
-    part.replace(path)
+    write_atomic(path, f"{_layout(document)}\n".encode())
 
 
 def _layout(value: Any, indent: str = "") -> str:

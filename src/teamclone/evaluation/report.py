@@ -17,6 +17,7 @@ from teamclone.evaluation import bootstrap, figures, paper
 from teamclone.evaluation.evaluate import evaluate, load_evaluation, model_id, save_evaluation, write_json
 from teamclone.evaluation.latency import load_bench, measure_latency
 from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.training.checkpoint import write_atomic
 from teamclone.training.config import to_toml
 from teamclone.training.run import Run
 
@@ -100,7 +101,7 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
     }[name]
     if split_by_rows(evaluation) and name != "unseen":
         where = "whose neighbouring moments it was trained on (split by row, as in the paper)"
-    matches = f"{n_matches} match" + ("" if n_matches == 1 else "es")
+    matches = "one match" if n_matches == 1 else f"{n_matches} matches"
     text = (
         f"In {matches} {where}, the clone names the next command of a {team} player right "
         f"{percent(model['accuracy']['value'])} of the time"
@@ -115,15 +116,7 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
         f"Repeating the player's last command would be right {percent(persistence['accuracy']['value'])} of the time, "
         f"always saying the most frequent one {percent(majority['accuracy']['value'])}."
     )
-    strongest = max(others.values(), key=lambda other: other["accuracy"]["value"] or 0.0)
-    gain = strongest["accuracy_gain"]
-    certain = gain["low"] if gain["low"] is not None else gain["value"]
-    if certain > 0:
-        said.append(f"That is {100 * gain['value']:.1f} points above the strongest rule without a network.")
-    elif gain["value"] > 0:
-        said.append("Whether that beats the strongest rule without a network is not certain: test on more matches.")
-    else:
-        said.append("That does not beat the strongest rule without a network: train longer or on more matches.")
+    said.append(verdict(section))
 
     unseen = evaluation["splits"].get("unseen")
     if unseen is not None and name == "test":
@@ -139,6 +132,21 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
             f"of the time, {how}."
         )
     return said
+
+
+def verdict(section: Mapping[str, Any]) -> str:
+    """Whether the clone beats the strongest rule, by accuracy and else by its probabilities."""
+    others = section["baselines"].values()
+    gain = max(others, key=lambda other: other["accuracy"]["value"])["accuracy_gain"]
+    if (gain["value"] if gain["low"] is None else gain["low"]) > 0:
+        return f"That is {100 * gain['value']:.1f} points above the strongest rule without a network."
+    skill = min(others, key=lambda other: other["cross_entropy"]["value"])["cross_entropy_skill"]["value"]
+    but = (
+        f", though its probabilities leave {percent(skill, 0)} less surprise than any rule's" if skill >= 0.005 else ""
+    )
+    if gain["value"] > 0:
+        return f"Whether that beats the strongest rule without a network is not certain{but}: test on more matches."
+    return f"That does not beat the strongest rule without a network{but}: train longer or on more matches."
 
 
 def listing(names: Sequence[str], most: int = 4) -> str:
@@ -241,9 +249,8 @@ def make_report(
         write_json(run.path / "bench.json", bench)
     html = render(run, evaluation, bench, history=run.history())
     path = out or run.path / "report.html"
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(html, encoding="utf-8")
-    part.replace(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomic(path, html.encode())
     return path
 
 

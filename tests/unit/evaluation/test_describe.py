@@ -106,7 +106,13 @@ def test_the_headline_claims_only_what_the_numbers_hold() -> None:
     assert "not certain" in " ".join(sentences(evaluation))
     for baseline in evaluation["splits"]["test"]["baselines"].values():
         baseline["accuracy_gain"] = {"value": -0.01, "low": None, "high": None}
-    assert "does not beat" in " ".join(sentences(evaluation))
+        baseline["cross_entropy_skill"] = {"value": 0.031, "low": None, "high": None}
+    text = " ".join(sentences(evaluation))
+    assert "does not beat" in text
+    assert "3\N{NARROW NO-BREAK SPACE}% less surprise" in text
+    for baseline in evaluation["splits"]["test"]["baselines"].values():
+        baseline["cross_entropy_skill"] = {"value": -0.2, "low": None, "high": None}
+    assert "surprise" not in " ".join(sentences(evaluation))
 
 
 def test_the_headline_names_unseen_opponents_and_a_leaking_split() -> None:

@@ -192,9 +192,18 @@ def test_info_wants_files_that_exist(tmp_path: Path) -> None:
 
 def test_validate(ingested: tuple[Path, dict[str, Any]], fixtures_dir: Path) -> None:
     store = ingested[0]
-    done = run("validate", store, fixtures_dir / "v6")
+    done = run("validate", store, fixtures_dir / "v6", "--jobs", 1)
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["ok"] * 5 + ["5"]
-    odd = run("validate", fixtures_dir / "v6", fixtures_dir / "killed", fixtures_dir / "converted", "--json", code=1)
+    odd = run(
+        "validate",
+        fixtures_dir / "v6",
+        fixtures_dir / "killed",
+        fixtures_dir / "converted",
+        "--json",
+        "--jobs",
+        1,
+        code=1,
+    )
     verdicts = {Path(verdict["name"]).name: verdict for verdict in map(json.loads, odd.stdout.splitlines())}
     assert [name for name, verdict in verdicts.items() if not verdict["ok"]] == ["3.rcg.gz", "incomplete.rcg.gz"]
     # The league's converter to version 3 writes the ball's vx into vy: impossible speeds, which a rule finds.
@@ -207,7 +216,7 @@ def test_validate_finds_a_damaged_store(ingested: tuple[Path, dict[str, Any]], t
     first, second, third, _ = sorted((store / "matches").iterdir())
     (first / "frames.parquet").write_bytes(b"PAR1")
     shutil.copy(second / "commands.parquet", third / "commands.parquet")
-    done = run("validate", "--store", store, code=1)
+    done = run("validate", "--store", store, "--jobs", 1, code=1)
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["wrong", "ok", "wrong", "ok", "4"]
     assert "frames.parquet: cannot be read" in done.stdout
     assert "rows in commands" in done.stdout

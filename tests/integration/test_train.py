@@ -145,6 +145,29 @@ def test_a_kill_between_the_files_of_an_epoch_is_made_good(dataset: Dataset, tmp
     assert ".last" not in resumed.checkpoints()
 
 
+@pytest.mark.parametrize("writes", range(12))
+def test_a_full_disk_at_any_write_costs_an_epoch_at_most(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, usual: tuple[Any, ...], writes: int
+) -> None:
+    left = writes
+
+    def fsync(_: int) -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("teamclone.training.checkpoint.os.fsync", fsync)
+        with pytest.raises(OSError, match="No space left"):
+            train(tiny("train.epochs=2"), dataset, tmp_path / "run")
+    # Two writes make the folder; where it was not made, training begins anew.
+    begun = (tmp_path / "run").exists()
+    assert begun == (writes >= 2)
+    assert not list(tmp_path.rglob("*.part"))
+    assert outcome(train(tiny("train.epochs=2"), dataset, tmp_path / "run", resume=begun)) == usual
+
+
 def test_more_epochs_may_be_added(dataset: Dataset, tmp_path: Path) -> None:
     train(tiny("train.epochs=2"), dataset, tmp_path / "run")
     longer = train(tiny("train.epochs=4"), dataset, tmp_path / "run", resume=True)
@@ -262,6 +285,19 @@ def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, cha
     lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **changes))
     with pytest.raises(DatasetError, match=rf"match 0{{15}}{match} has no {channel} in its log"):
         train(tiny(), lacking, tmp_path / "run")
+
+
+def test_tensorboard_shows_each_epoch_once_after_a_resume(dataset: Dataset, tmp_path: Path) -> None:
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    with pytest.raises(KeyboardInterrupt):
+        train(tiny(), dataset, tmp_path / "run", on_progress=stop_at(3, 1))
+    run = train(tiny(), dataset, tmp_path / "run", resume=True)
+    events = EventAccumulator(str(run.path / "tensorboard"))
+    events.Reload()
+    shown = {event.step: event.value for event in events.Scalars("validation/accuracy")}
+    assert shown == pytest.approx({record["epoch"]: record["validation_accuracy"] for record in run.history()})
+    assert {"train/loss", "validation/recall_dash", "samples_per_s"} <= set(events.Tags()["scalars"])
 
 
 def test_metrics_are_plain_json(dataset: Dataset, tmp_path: Path) -> None:

@@ -66,6 +66,12 @@ def print_summary(evaluation: dict[str, Any]) -> None:
         print("No interval where a split has one match: matches, not rows, vary independently.")
     if any(1 < len(split["matches"]) < FEW_MATCHES for split in splits.values()):
         print(f"Intervals from fewer than {FEW_MATCHES} matches are too narrow: take them as the spread seen so far.")
+    for name, split in splits.items():
+        for number, row in split["strangers"].items():
+            print(
+                f"{name}: number {number} gives {row['rows']:,} commands (accuracy {row['accuracy']:.3f}) and none in "
+                "training: inputs that know players by their number do not know this one."
+            )
     for name in [name for name in ("test", "unseen") if name in splits] or list(splits):
         split = splits[name]
         print()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,7 +57,7 @@ def train(
     opened = open_dataset(dataset)
     try:
         with progress("train") as bar:
-            report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines
+            report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines()
             run = loop.train(config, opened, out, resume=resume, on_progress=report)
     except KeyboardInterrupt:
         finished = len(open_run(out).history()) if is_run(out) else 0
@@ -83,11 +84,18 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Progress], None]:
     return report
 
 
-def _lines(at: Progress) -> None:
-    """Progress as about ten lines in all, for logs."""
-    tenth = at.epochs / 10
-    if at.record is not None and (at.epoch == 1 or int(at.epoch / tenth) > int((at.epoch - 1) / tenth)):
-        print(f"epoch {at.epoch}/{at.epochs}: {_line(at)}", file=sys.stderr, flush=True)
+def _lines() -> Callable[[Progress], None]:
+    """Progress as lines for a log: one for every tenth of the epochs, and at least one a minute."""
+    told = float("-inf")
+
+    def report(at: Progress) -> None:
+        nonlocal told
+        now, tenths = time.monotonic(), 10 * at.epoch // at.epochs - 10 * (at.epoch - 1) // at.epochs
+        if at.record is not None and (tenths or now - told > 60):
+            told = now
+            print(f"epoch {at.epoch}/{at.epochs}: {_line(at)}", file=sys.stderr, flush=True)
+
+    return report
 
 
 def _line(at: Progress) -> str:

@@ -182,12 +182,13 @@ def evaluate(
 
     counted = count_training(trained_on, on_batch=on_batch)
     known = {match["match_id"] for match in _used(trained_on, Split.TRAIN)} if foreign and own is not None else set()
-    sections = {
-        split.name.lower(): describe(
-            predict(model, data, index, on_batch=on_batch), baselines=counted, matches=data.matches, seed=seed
-        )
-        for split, index in rows.items()
-    }
+    trained_numbers = _players(trained_on, trained_on.split(Split.TRAIN))
+    sections = {}
+    for split, index in rows.items():
+        outcome = predict(model, data, index, on_batch=on_batch)
+        section = describe(outcome, baselines=counted, matches=data.matches, seed=seed)
+        section["strangers"] = strangers(outcome, players=_players(data, index), trained=trained_numbers)
+        sections[split.name.lower()] = section
     return {
         "format": FORMAT,
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
@@ -213,6 +214,33 @@ def evaluate(
         "resamples": bootstrap.N_RESAMPLES,
         "splits": sections,
         "data": characterise(data, seed=seed),
+    }
+
+
+def _players(dataset: Dataset, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """(n,) who gave the commands: 0..10 for the numbers 1..11."""
+    players: NDArray[np.uint8] = dataset.samples["player"].numpy()[rows]
+    return players
+
+
+def strangers(
+    outcome: Outcome, *, players: NDArray[np.uint8], trained: NDArray[np.uint8]
+) -> dict[str, dict[str, float | int]]:
+    """Numbers that play in a split but never played in training, each with its rows and accuracy.
+
+    Teams now and then give the goalkeeper another number than 1. A network that knows players by their number, as the
+    paper's does, has then never seen the field player who wears his.
+
+    Args:
+        outcome: the split. players: (n,) who acted in it. trained: who acted in the rows of training.
+    """
+    right = outcome.probabilities.argmax(axis=1) == outcome.kind
+    return {
+        str(int(player) + 1): {
+            "rows": int((players == player).sum()),
+            "accuracy": float(right[players == player].mean()),
+        }
+        for player in np.setdiff1d(players, trained)
     }
 
 

@@ -246,8 +246,14 @@ def read_binary(data: bytes, *, path: Path | None = None) -> GameLog:
         raise LogError(f"holds no frame: expected records of binary version {version}", path=path)
     complete = any(record.mode == _MSG and b"(result " in data[record.start : record.stop] for record in records.others)
     if version == 3:
-        return _decode_fine(data, records, complete=complete, path=path)
-    return _decode_coarse(data, records, version=version, complete=complete, path=path)
+        game = _decode_fine(data, records, complete=complete, path=path)
+    else:
+        game = _decode_coarse(data, records, version=version, complete=complete, path=path)
+    # Version 1 has no header: two bytes of anything can look like one, but hardly the names as well.
+    for name in (game.left.name, game.right.name):
+        if name is not None and not (name.isascii() and name.isprintable()):
+            raise LogError(f"expected a binary game log, but a team's name would be {name!r}", path=path, byte=0)
+    return game
 
 
 def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:

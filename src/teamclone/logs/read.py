@@ -34,7 +34,7 @@ from teamclone.logs.rcl import FIRST_LINE, read_commands, sender_names
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
 
-_LOG_NAME = re.compile(r"(?P<stem>.+)\.(?P<kind>rcg|rcl)(?P<packing>\.(?:gz|xz|zst))?$", re.IGNORECASE)
+_LOG_NAME = re.compile(r"(?P<stem>.+)\.(?P<kind>rcg|rcl)(?P<packing>\.(?:gz|xz|zst))?\Z", re.IGNORECASE | re.DOTALL)
 _FEWEST_EXECUTED = 0.8
 """Below this share of executed body commands in play_on a command log belongs to another match.
 
@@ -336,7 +336,7 @@ def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:
     for side, team, slots in (("left", game.left, slice(0, 11)), ("right", game.right, slice(11, 22))):
         if team.name is None or not on_field[:, slots].any():
             problems.append(
-                Problem(code="no-team", severity=Severity.WARNING, text=f"no {side} team connected", path=path)
+                Problem(code="no-team", severity=Severity.NOTE, text=f"no {side} team connected", path=path)
             )
             continue
         left_field = on_field[:-1, slots] & ~on_field[1:, slots] & ((state[1:, slots] & state_bits.RED_CARD) == 0)
@@ -346,7 +346,7 @@ def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:
             problems.append(
                 Problem(
                     code="disconnected",
-                    severity=Severity.WARNING,
+                    severity=Severity.NOTE,
                     text=f"{len(gone)} player(s) of {team.name} left the field: "
                     + ", ".join(str(unum + 1) for unum in gone),
                     path=path,

@@ -17,11 +17,14 @@ from teamclone.errors import RunError
 def write_atomic(path: Path, data: bytes) -> None:
     """Write a file so that a reader, also after a crash, sees the old one or the new one."""
     temporary = path.with_name(f".{path.name}.part")
-    with temporary.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    try:
+        with temporary.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def save_weights(path: Path, model: nn.Module, *, epoch: int) -> None:

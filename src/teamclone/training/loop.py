@@ -133,7 +133,8 @@ def train(
                 )
             _finish_epoch(run, model, optimiser, record, history)
             for name, value in record.items():
-                board.add_scalar(name.replace("_", "/", 1) if "_" in name else name, value, epoch)
+                group, _, figure = name.partition("_")
+                board.add_scalar(f"{group}/{figure}" if group in {"train", "validation"} else name, value, epoch)
             on_progress(Progress(epoch, config.train.epochs, batches, batches, record))
     return run
 
@@ -181,7 +182,7 @@ def _resources(config: TrainConfig) -> tuple[torch.device, Literal["fp32", "bf16
 
 
 def has_fast_bfloat16(device: torch.device) -> bool:
-    """Whether matrix products are faster in bfloat16: three to four times on processors that have it, else slower."""
+    """Whether matrix products are faster in bfloat16: about three times on processors that have it, else slower."""
     if device.type == "cuda":
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))
     able = torch.cpu.get_capabilities()

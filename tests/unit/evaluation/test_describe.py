@@ -9,7 +9,7 @@ import pytest
 
 from teamclone.evaluation import metrics
 from teamclone.evaluation.baselines import Baselines
-from teamclone.evaluation.evaluate import describe, write_json
+from teamclone.evaluation.evaluate import describe, strangers, write_json
 from teamclone.evaluation.outcome import Outcome
 from teamclone.evaluation.report import listing, number, percent, points, sentences
 
@@ -133,3 +133,22 @@ def test_numbers_as_readers_see_them() -> None:
     assert listing(["A"]) == "A"
     assert listing(["A", "B", "C"]) == "A, B and C"
     assert listing(["A", "B", "C", "D", "E", "F"]) == "A, B, C, D and 2 more"
+
+
+def test_numbers_that_never_played_in_training_are_named():
+    """Player 0 (number 1) is in the split and not in training; 3 of his 4 commands are predicted right."""
+    kind = np.array([0, 0, 1, 1, 0], np.int64)
+    probabilities = np.eye(4, dtype=np.float32)[[0, 0, 1, 0, 0]]
+    outcome = Outcome(
+        probabilities=probabilities,
+        parameters=np.zeros((5, 6), np.float32),
+        kind=kind,
+        issued=np.zeros((5, 6), np.float32),
+        last=kind,
+        match=np.zeros(5, np.int64),
+        position=np.zeros((5, 2), np.float32),
+    )
+    players = np.array([0, 0, 0, 0, 7], np.uint8)
+    trained = np.array([5, 7, 7], np.uint8)
+    assert strangers(outcome, players=players, trained=trained) == {"1": {"rows": 4, "accuracy": 0.75}}
+    assert strangers(outcome, players=players, trained=players) == {}

@@ -140,3 +140,8 @@ def test_an_unknown_record_ends_the_reading(data: bytes):
 def test_not_a_binary_log(content: bytes):
     with pytest.raises(LogError, match=r"^x\.rcg: "):
         read_binary(content, path=Path("x.rcg"))
+
+
+def test_garbage_that_begins_like_version_1_is_no_match():
+    with pytest.raises(LogError, match="team's name would be"):
+        read_binary(b"\0\1" + bytes(range(256)) * 40)

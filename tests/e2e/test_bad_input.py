@@ -29,15 +29,16 @@ def one_line(stderr: str) -> str:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "is empty"),
-        (b"\x00\xff" * 500, "no game log"),
-        (b"PK\x03\x04 a zip archive", "no game log"),
-        (b"ULG6\n", "no frame"),
-        (b"ULG6\n(show 1 ((b) 0 0 0 0))\n", "22 players"),
-        (gzip.compress(b"hello, this is something else\n"), "no game log"),
-        (gzip.compress(b""), "empty after decompression"),
-        (b"\x1f\x8b\x08 broken gzip", "damaged"),
-        (b"[1, 2", "frame"),
+        pytest.param(b"", "is empty", id="empty"),
+        pytest.param(b"\x00\xff" * 500, "no game log", id="bytes"),
+        pytest.param(b"\x00\x01" * 2000, "team's name", id="bytes like version 1"),
+        pytest.param(b"PK\x03\x04 a zip archive", "no game log", id="zip"),
+        pytest.param(b"ULG6\n", "no frame", id="only a header"),
+        pytest.param(b"ULG6\n(show 1 ((b) 0 0 0 0))\n", "22 players", id="no players"),
+        pytest.param(gzip.compress(b"hello, this is something else\n"), "no game log", id="gz of something else"),
+        pytest.param(gzip.compress(b""), "empty after decompression", id="gz of nothing"),
+        pytest.param(b"\x1f\x8b\x08 broken gzip", "damaged", id="broken gz"),
+        pytest.param(b"[1, 2", "frame", id="json of something else"),
     ],
 )
 def test_files_that_are_no_logs(tmp_path: Path, content: bytes, words: str) -> None:

@@ -4,15 +4,20 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 MATCHES ?= samples
+TEAM ?= HELIOS_base
+KILLS ?= 50
+MINUTES ?= 30
 DEMO := demo
 
-.PHONY: help install browser demo test lint format bench clean
+.PHONY: help install browser demo test lint format bench faults fuzz clean
 
 help:
 	@echo "make demo     train and report a clone of HELIOS_base on the bundled matches"
 	@echo "make test     run the tests"
 	@echo "make lint     ruff and mypy"
-	@echo "make bench    speed, as ratios (MATCHES=folder of logs)"
+	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name)"
+	@echo "make faults   kill ingest, dataset and train KILLS times each and resume (default 50)"
+	@echo "make fuzz     fuzz every log reader for MINUTES (default 30)"
 	@echo "make install  only set up $(VENV)"
 
 install: $(VENV)/installed
@@ -52,7 +57,20 @@ format: install
 	$(BIN)/ruff format .
 
 bench: install
-	$(BIN)/python benchmarks/pipeline.py $(MATCHES)
+	$(BIN)/python benchmarks/reading.py $(MATCHES)
+	$(BIN)/python benchmarks/ingest.py $(MATCHES)
+	rm -rf .bench && $(BIN)/teamclone ingest $(MATCHES) --store .bench/store
+	$(BIN)/python benchmarks/dataset.py .bench/store --team $(TEAM)
+	$(BIN)/teamclone dataset --store .bench/store --team $(TEAM) --out .bench/dataset >/dev/null
+	$(BIN)/python benchmarks/training.py .bench/dataset
+	$(BIN)/python benchmarks/stores.py $(MATCHES) --count 2
+
+faults: install
+	$(BIN)/python -m pytest tests/faults --kills $(KILLS) --timeout 0
+
+fuzz: install
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
+	$(BIN)/python tests/faults/fuzz_readers.py .fuzz --minutes $(MINUTES)
 
 clean:
-	rm -rf $(VENV) $(DEMO) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEMO) .bench .fuzz build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,10 +1,13 @@
-"""Where the real logs lie that the tests read."""
+"""Where the real logs lie that the tests read, and a real database server."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from postgres import Server, start_server
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / "samples"
@@ -21,3 +24,20 @@ def samples_dir() -> Path:
 def fixtures_dir() -> Path:
     """Small odd matches, a folder each, see its README.md."""
     return FIXTURES
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Server]:
+    """A running PostgreSQL server."""
+    server = start_server()
+    yield server
+    server.throw_away()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--kills", type=int, default=3, help="how often each test of tests/faults kills its command")
+
+
+@pytest.fixture(scope="session")
+def kills(request: pytest.FixtureRequest) -> int:
+    return int(request.config.getoption("--kills"))

@@ -56,5 +56,9 @@ class DatasetError(TeamcloneError):
     """A dataset that is missing, foreign, of another format number, or empty after cleaning."""
 
 
+class ClusterError(TeamcloneError):
+    """A cluster that does not answer, has no workers, or went away."""
+
+
 class RunError(TeamcloneError):
     """A run folder that is missing, incomplete or of another format number."""

@@ -108,7 +108,8 @@ def test_the_paper_row_split_is_there_for_comparison(work: Path) -> None:
     report = json.loads(teamclone("dataset", "--store", work / "store", "--out", out, *options).stdout)
     rows = {split: sum(kinds.values()) for split, kinds in report["rows"].items()}
     seen = rows["train"] + rows["validation"] + rows["test"]
-    assert rows["train"] == round(0.95 * seen)
+    # Rounded within each of the six matches.
+    assert abs(rows["train"] - 0.95 * seen) <= 3
     assert {match["split"] for match in report["matches"]} == {"rows", "unseen"}
 
 

@@ -16,6 +16,8 @@ from pathlib import Path
 
 import pytest
 
+from command import teamclone
+from disk import small_disk
 from teamclone.errors import LogError, StoreError, UsageError
 from teamclone.logs import LogPair
 from teamclone.store import Store, create_store, ingest, open_store
@@ -87,6 +89,21 @@ def test_a_touched_file_is_read_again_but_not_written(logs: Path, store: Store) 
     before = tree(store)
     ingest([logs], store)
     assert tree(store) == before
+
+
+@pytest.mark.parametrize("seconds", [-86400, 0, 86400])
+def test_clocks_may_be_set(logs: Path, store: Store, seconds: int) -> None:
+    """A log that grew is read again, whether its time went back, stayed or went far ahead."""
+    log = logs / f"{PLAIN}.rcg.gz"
+    whole, before = log.read_bytes(), log.stat().st_mtime_ns
+    log.write_bytes(whole[: len(whole) // 2])
+    os.utime(log, ns=(before, before))
+    assert ingest([logs], store).files[0].outcome is Outcome.PARTIAL
+    log.write_bytes(whole)
+    os.utime(log, ns=(before, before + seconds * 10**9))
+    assert [status.outcome for status in ingest([logs], store).files] == [Outcome.OK] * 2
+    assert store.matches()["complete"].to_pylist() == [True]
+    assert ingest([logs], store).unchanged == 1
 
 
 def test_a_command_log_that_comes_later_is_added(logs: Path, store: Store) -> None:
@@ -332,3 +349,49 @@ def test_a_store_that_cannot_be_written(logs: Path, tmp_path: Path) -> None:
         create_store(tmp_path / "file")
     with pytest.raises(StoreError, match="cannot be written"):
         create_store(tmp_path / "file" / "store")
+
+
+def test_a_full_disk_costs_no_match(fixtures_dir: Path, tmp_path: Path) -> None:
+    """Short of room for the second match, the first stays, and with room the ingest goes on."""
+    logs = [fixtures_dir / "json", fixtures_dir / "v6"]
+    for log in logs:
+        teamclone("ingest", log, "--store", tmp_path / "whole", "--jobs", "1")
+    sizes = sorted(
+        sum(path.stat().st_size for path in match.iterdir()) for match in (tmp_path / "whole" / "matches").iterdir()
+    )
+    with small_disk(tmp_path / "disk", kilobytes=(sizes[0] + sizes[1] // 2) // 1024 + 100) as disk:
+        root = disk / "store"
+        done = teamclone("ingest", *logs, "--store", root, "--jobs", "1", code=1)
+        assert done.stderr.startswith(f"teamclone: {root}: the disk is full; make room and ingest again"), done.stderr
+        assert done.stderr.count("\n") == 1
+        assert len(open_store(root).match_ids()) <= 1
+        subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
+        ingest(logs, open_store(root), jobs=1)
+        assert open_store(root).match_ids() == open_store(tmp_path / "whole").match_ids()
+        assert list((root / "unfinished").iterdir()) == []
+
+
+def test_a_store_on_a_read_only_disk(fixtures_dir: Path, tmp_path: Path) -> None:
+    with small_disk(tmp_path / "disk", kilobytes=65536) as disk:
+        root = disk / "store"
+        assert ingest([fixtures_dir / "v6"], create_store(root), jobs=1).added == 1
+        subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+        done = teamclone("ingest", fixtures_dir / "json", "--store", root, code=1)
+        assert done.stderr.startswith(f"teamclone: {root}: cannot be written (Read-only file system)"), done.stderr
+        assert "HELIOS_base" in teamclone("matches", "--store", root).stdout
+        teamclone("dataset", "--store", root, "--team", "HELIOS_base", "--out", tmp_path / "ds", "--split", "rows")
+
+
+def test_two_ingests_at_once(samples_dir: Path, tmp_path: Path) -> None:
+    """The second says so and does no harm to the first."""
+    root = tmp_path / "store"
+    first = start(samples_dir, root)
+    try:
+        wait_for(lambda: first.poll() is not None or (root / ".lock").exists(), "lock")
+        second = teamclone("ingest", samples_dir, "--store", root, code=1)
+        out, err = first.communicate(timeout=100)
+    finally:
+        first.kill()
+    assert "another ingest is writing to this store" in second.stderr
+    assert first.returncode == 0, err
+    assert "12 ok, 0 partial, 0 failed" in out

@@ -245,6 +245,14 @@ def test_cuda_is_not_replaced_silently(dataset: Dataset, tmp_path: Path) -> None
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no CUDA device")
+def test_a_gpu_trains_what_a_processor_trains(dataset: Dataset, tmp_path: Path) -> None:
+    card = train(tiny("train.device=cuda"), dataset, tmp_path / "card")
+    assert card.environment["device"] == "cuda"
+    for mine, theirs in zip(figures(card), figures(train(tiny(), dataset, tmp_path / "processor")), strict=True):
+        assert mine == pytest.approx(theirs, rel=1e-2)
+
+
 def test_a_time_budget_ends_with_a_whole_epoch(dataset: Dataset, tmp_path: Path) -> None:
     run = train(tiny("train.epochs=500", "train.max_minutes=0.01"), dataset, tmp_path / "run")
     epochs = len(run.history())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 
@@ -22,7 +23,16 @@ from teamclone.cli import (
 from teamclone.cli.common import fail
 from teamclone.errors import TeamcloneError, UsageError
 
-EXTRAS = {"torch": "train", "safetensors": "train", "tensorboard": "train", "matplotlib": "report", "jinja2": "report"}
+EXTRAS = {
+    "torch": "train",
+    "safetensors": "train",
+    "tensorboard": "train",
+    "matplotlib": "report",
+    "jinja2": "report",
+    "distributed": "cluster",
+    "adbc_driver_postgresql": "postgresql",
+    "adbc_driver_manager": "postgresql",
+}
 """The extra that installs a package which the base does not."""
 
 app = typer.Typer(
@@ -50,6 +60,11 @@ for command in (
 
 @app.callback(invoke_without_command=True)
 def root(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+    if sys.stderr.isatty():
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("teamclone: %(message)s"))
+        logging.getLogger("teamclone").addHandler(handler)
+        logging.getLogger("teamclone").setLevel(logging.INFO)
     if version:
         from teamclone import __version__
 

@@ -11,7 +11,9 @@ from teamclone.cli.common import choice, print_json, print_table, progress
 
 
 def dataset(
-    store: Annotated[Path, typer.Option(help="The store to read, see `teamclone ingest`.")],
+    store: Annotated[
+        str, typer.Option(help="The store to read: a folder or postgresql://USER:PASSWORD@HOST/DATABASE.")
+    ],
     team: Annotated[str, typer.Option(help="The team to clone, as its logs name it.")],
     out: Annotated[Path, typer.Option(help="The folder to write.")],
     unseen: Annotated[list[str] | None, typer.Option(help="An opponent to keep out of training; repeatable.")] = None,
@@ -27,6 +29,10 @@ def dataset(
     ] = None,
     validation_match: Annotated[list[str] | None, typer.Option(help="The same for validation; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Work on the Dask cluster of this scheduler: tcp://host:port.")
+    ] = None,
     replace: Annotated[bool, typer.Option(help="Put it in the place of a dataset that is already there.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the cleaning report as JSON.")] = False,
 ) -> None:
@@ -34,6 +40,7 @@ def dataset(
     from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
     from teamclone.dataset.clean import Commands, TurnZero
     from teamclone.store import open_store
+    from teamclone.store.cluster import executor_of
 
     config = DatasetConfig(
         team=team,
@@ -47,14 +54,16 @@ def dataset(
         validation=validation,
         seed=seed,
     )
-    with progress("dataset") as bar:
+    with executor_of(scheduler, jobs=jobs) as executor, progress("dataset") as bar:
         task = bar.add_task("", total=None)
         report = build_dataset(
             config,
             store=open_store(store),
             out=out,
+            executor=executor,
+            jobs=jobs,
             replace=replace,
-            on_progress=lambda done, total, name: bar.update(task, completed=done, total=total, description=name),
+            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     if as_json:
         print_json(report)

@@ -10,22 +10,27 @@ import typer
 
 def ingest(
     paths: Annotated[list[Path], typer.Argument(help="Logs (.rcg, .rcl, also .gz, .xz, .zst) or folders of them.")],
-    store: Annotated[Path, typer.Option(help="Folder of the store; made if missing.")],
+    store: Annotated[str, typer.Option(help="A folder or postgresql://USER:PASSWORD@HOST/DATABASE; made if missing.")],
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Work on the Dask cluster of this scheduler: tcp://host:port.")
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Stop at the first file that is not perfect.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> None:
     """Read match logs into a store. Files that were read before and have not changed are skipped."""
     from teamclone.cli.common import print_json, print_table, progress
     from teamclone.store import create_store
+    from teamclone.store.cluster import executor_of
     from teamclone.store.ingest import ingest as run
     from teamclone.store.status import Outcome
 
-    with progress("ingest") as bar:
+    with executor_of(scheduler, jobs=jobs) as executor, progress("ingest") as bar:
         task = bar.add_task("", total=None)
         report = run(
             paths,
             create_store(store),
+            executor=executor,
             jobs=jobs,
             strict=strict,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),

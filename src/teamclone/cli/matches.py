@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 
 def matches(
-    store: Annotated[Path, typer.Option(help="Folder of the store.")],
+    store: Annotated[str, typer.Option(help="A folder or postgresql://USER:PASSWORD@HOST/DATABASE.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print all columns of the table matches as JSON.")] = False,
 ) -> None:
     """List the matches of a store."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -20,7 +19,7 @@ SHOWN = 200
 
 def sql(
     query: Annotated[str, typer.Argument(help="A statement that only reads; - takes it from standard input.")],
-    store: Annotated[Path, typer.Option(help="Folder of the store.")],
+    store: Annotated[str, typer.Option(help="A folder or postgresql://USER:PASSWORD@HOST/DATABASE.")],
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, all rows.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list of objects, all rows.")] = False,
 ) -> None:

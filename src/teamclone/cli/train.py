@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from teamclone.cli.common import fail, print_json, print_table, progress
+from teamclone.errors import TeamcloneError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,12 +51,16 @@ def train(
 
     from teamclone.dataset.reader import open_dataset
     from teamclone.training import loop
+    from teamclone.training.group import is_first
     from teamclone.training.run import is_run, open_run
 
     if resume and preset is None:
         config = override(open_run(out).config, overrides or [])
     opened = open_dataset(dataset)
     try:
+        if not is_first():
+            _in_silence(lambda: loop.train(config, opened, out, resume=resume))
+            return
         with progress("train") as bar:
             report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines()
             run = loop.train(config, opened, out, resume=resume, on_progress=report)
@@ -64,6 +69,16 @@ def train(
         again = f"teamclone train {dataset} --out {out} --resume"
         fail(f"interrupted; {finished} finished epochs are kept; go on with `{again}`", code=130)
     _summary(run, as_json=as_json)
+
+
+def _in_silence(work: Callable[[], object]) -> None:
+    """Work as one of several processes, of which another one speaks for all."""
+    try:
+        work()
+    except TeamcloneError:
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        raise typer.Exit(130) from None
 
 
 def _bar(task: int, update: Callable[..., None]) -> Callable[[Progress], None]:

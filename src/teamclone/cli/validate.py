@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 def validate(
     paths: Annotated[list[Path] | None, typer.Argument(help="Logs, folders of logs, or stores.")] = None,
-    store: Annotated[Path | None, typer.Option(help="Check the matches of this store.")] = None,
+    store: Annotated[
+        str | None, typer.Option(help="Check this store: a folder or postgresql://USER:PASSWORD@HOST/DATABASE.")
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a match, each on a line.")] = False,
 ) -> None:
@@ -27,9 +29,11 @@ def validate(
     from teamclone.store.validate import validate_logs, validate_store
 
     logs = [path for path in paths or [] if not is_store(path)]
-    stores = [path for path in paths or [] if is_store(path)] + ([store] if store is not None else [])
+    stores: list[Path | str] = [path for path in paths or [] if is_store(path)]
+    if store is not None:
+        stores.append(store)
     if not logs and not stores:
-        raise UsageError("expected logs, folders of logs or --store DIR, got nothing to validate")
+        raise UsageError("expected logs, folders of logs or --store STORE, got nothing to validate")
     wrong = total = 0
     with progress("validate") as bar:
         task = bar.add_task("", total=None)
@@ -39,7 +43,7 @@ def validate(
 
         for verdict in chain(
             validate_logs(logs, jobs=jobs, on_progress=on_progress) if logs else (),
-            *(validate_store(open_store(path), jobs=jobs, on_progress=on_progress) for path in stores),
+            *(validate_store(open_store(place), jobs=jobs, on_progress=on_progress) for place in stores),
         ):
             print(json.dumps(as_object(verdict), ensure_ascii=False) if as_json else line(verdict))
             total += 1

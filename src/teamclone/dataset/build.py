@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,11 +17,15 @@ from numpy.typing import NDArray
 from teamclone.dataset import clean, layout
 from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
-from teamclone.dataset.write import write_dataset
+from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.errors import DatasetError, UsageError
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
 from teamclone.store import Store
+from teamclone.store.workers import Died, SharedStore, run_tasks
+
+AHEAD = 64
+"""Cleaned matches that a cluster may hold ready: more than one writer takes from it in a second, in 300 MB."""
 
 
 class SplitBy(StrEnum):
@@ -65,18 +70,32 @@ class _Entry:
     opponent: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Task:
+    store: SharedStore
+    entry: _Entry
+    commands: Commands
+    turn_zero: TurnZero
+
+
 def build_dataset(
     config: DatasetConfig,
     *,
     store: Store,
     out: Path,
+    executor: Executor | None = None,
+    jobs: int | None = None,
     replace: bool = False,
-    on_progress: Callable[[int, int, str], None] | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Builds a dataset and writes it to ``out``.
+    """Builds a dataset and writes it to ``out``, the same bytes wherever its matches are cleaned.
 
     Args:
-        on_progress: called with (matches done, matches in all, name of the match) before each match.
+        executor: where matches are cleaned, for example on a cluster (``cluster.executor_of``); its workers must see
+            the store under the same path. None starts processes on this machine.
+        jobs: how many, None for one a processor. More than one needs the usual ``if __name__ == "__main__"`` guard.
+        replace: put it in the place of a dataset that is already there.
+        on_progress: called with the matches that are done and their number.
 
     Returns:
         The cleaning report: ``rules`` (name, before, after over all matches), ``matches`` (each with its split, rules
@@ -84,7 +103,9 @@ def build_dataset(
 
     Raises:
         UsageError: the team or an unseen opponent does not occur in the store.
+        StoreError: a match cannot be read, or a worker does not see the store.
         DatasetError: no row is left, or ``out`` cannot be written.
+        ClusterError: the connection to the executor's workers was lost.
     """
     entries, without_team = _entries(store, config)
     splits = split_matches(
@@ -95,45 +116,64 @@ def build_dataset(
         validation=config.validation,
         seed=config.seed,
     )
-    cleaned: list[MatchSamples] = []
-    types: list[NDArray[np.float64]] = []
-    for done, entry in enumerate(entries):
-        if on_progress is not None:
-            on_progress(done, len(entries), entry.name)
-        cleaned.append(
-            clean.clean_match(
-                store.read_match_columns(entry.match_id, "frames", columns=clean.FRAME_COLUMNS),
-                store.read_match_columns(entry.match_id, "player_states", columns=clean.PLAYER_COLUMNS),
-                store.read_match_columns(entry.match_id, "commands", columns=clean.COMMAND_COLUMNS),
-                store.read_parameters(entry.match_id)["server"],
-                side=entry.side,
-                keep=config.commands,
-                turn_zero=config.turn_zero,
+    shared = SharedStore.of(store)
+    tasks = [
+        _Task(store=shared, entry=entry, commands=config.commands, turn_zero=config.turn_zero) for entry in entries
+    ]
+    matches: list[dict[str, Any]] = []
+    types: list[NDArray[np.float32]] = []
+    rows = np.zeros((len(layout.Split), len(CLONED_KINDS)), np.int64)
+    with writing_dataset(out, replace=replace) as writer:
+        for task, cleaned in run_tasks(_clean, tasks, executor=executor, jobs=jobs, ahead=AHEAD, in_order=True):
+            if isinstance(cleaned, Died):
+                raise DatasetError(
+                    f"{task.entry.name}: the process that cleaned it was killed, perhaps out of memory; "
+                    "try again with --jobs 1"
+                )
+            match, types_of_match = cleaned
+            split, kind = splits[task.entry.match_id], match.samples["kind"]
+            if config.split is SplitBy.ROWS and split is not layout.Split.UNSEEN:
+                of_rows, name = split_rows(len(kind), match_id=task.entry.match_id, seed=config.seed), "rows"
+            else:
+                of_rows, name = np.full(len(kind), split, np.uint8), split.name.lower()
+            _add(writer, match, index=len(matches), split=of_rows)
+            np.add.at(rows, (of_rows, kind), 1)
+            matches.append(_report_match(task.entry, match, split=name))
+            types.append(types_of_match)
+            if on_progress is not None:
+                on_progress(len(matches), len(entries))
+        report = _report(config, matches, rows=rows, without_team=without_team)
+        if not writer.n_samples:
+            left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
+            raise DatasetError(
+                f"{out}: no command of {config.team} is left after cleaning ({left}). "
+                "Matches without a command log have none to give, and before log version 3 nothing tells what was "
+                "executed"
             )
-        )
-        columns = store.read_match_columns(entry.match_id, "player_types", columns=FIELDS)
-        types.append(np.stack([columns[name] for name in FIELDS], axis=-1))
-    frames, samples = _join(entries, cleaned, splits)
-    seen = samples["split"] != layout.Split.UNSEEN
-    if config.split is SplitBy.ROWS:
-        samples["split"][seen] = split_rows(int(seen.sum()), seed=config.seed)
-    report = _report(config, entries, cleaned, splits=splits, samples=samples, frames=frames, without_team=without_team)
-    if not len(samples["kind"]):
-        left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
-        raise DatasetError(
-            f"{out}: no command of {config.team} is left after cleaning ({left}). "
-            "Matches without a command log have none to give, and before log version 3 nothing tells what was executed"
-        )
-    meta = {
-        "team": config.team,
-        "options": asdict(config),
-        "matches": [{key: value for key, value in row.items() if key != "rules"} for row in report["matches"]],
-        "cleaning": report,
-    }
-    write_dataset(out, frames=frames, samples=samples, player_types=_pad_types(types), meta=meta, replace=replace)
-    if on_progress is not None:
-        on_progress(len(entries), len(entries), "")
+        meta = {
+            "team": config.team,
+            "options": asdict(config),
+            "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
+            "cleaning": report,
+        }
+        writer.finish(player_types=_pad_types(types), meta=meta)
     return report
+
+
+def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:
+    """Runs in a worker: the samples of one match and its player types, (n_types, n_fields)."""
+    store, match_id = task.store.open(), task.entry.match_id
+    samples = clean.clean_match(
+        store.read_match_columns(match_id, "frames", columns=clean.FRAME_COLUMNS),
+        store.read_match_columns(match_id, "player_states", columns=clean.PLAYER_COLUMNS),
+        store.read_match_columns(match_id, "commands", columns=clean.COMMAND_COLUMNS),
+        store.read_parameters(match_id)["server"],
+        side=task.entry.side,
+        keep=task.commands,
+        turn_zero=task.turn_zero,
+    )
+    types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
+    return samples, np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32)
 
 
 def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
@@ -183,34 +223,18 @@ def _fixed(entries: Sequence[_Entry], config: DatasetConfig) -> dict[str, layout
     return fixed
 
 
-def _join(
-    entries: Sequence[_Entry], cleaned: Sequence[MatchSamples], splits: dict[str, layout.Split]
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
-    """All matches behind one another; samples point at the joined frames."""
-    counts = [len(match.frames["cycle"]) for match in cleaned]
-    offsets = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int64)
-    frames = {
-        array.name: np.concatenate([match.frames[array.name] for match in cleaned])
-        for array in layout.FRAME_ARRAYS
-        if array.name != "match"
-    }
-    frames["match"] = np.repeat(np.arange(len(cleaned), dtype=np.int32), counts)
-    samples = {
-        array.name: np.concatenate([match.samples[array.name] for match in cleaned])
-        for array in layout.SAMPLE_ARRAYS
-        if array.name not in {"split", "frame"}
-    }
-    samples["frame"] = np.concatenate(
-        [match.samples["frame"] + offset for match, offset in zip(cleaned, offsets, strict=True)]
-    ).astype(np.int32)
-    samples["split"] = np.repeat(
-        np.array([splits[entry.match_id] for entry in entries], np.uint8),
-        [len(match.samples["kind"]) for match in cleaned],
+def _add(writer: DatasetWriter, match: MatchSamples, *, index: int, split: NDArray[np.uint8]) -> None:
+    """Append a match, the ``index``-th, whose samples then point at the frames of the dataset."""
+    first = writer.n_frames
+    if first + len(match.frames["cycle"]) > np.iinfo(np.int32).max:
+        raise DatasetError("a dataset holds at most two billion frames; give each team, or each year, its own")
+    writer.add(
+        frames={**match.frames, "match": np.full(len(match.frames["cycle"]), index, np.int32)},
+        samples={**match.samples, "frame": match.samples["frame"] + np.int32(first), "split": split},
     )
-    return frames, samples
 
 
-def _pad_types(types: Sequence[NDArray[np.float64]]) -> NDArray[np.float32]:
+def _pad_types(types: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
     """(n_matches, n_types, n_fields); matches with fewer types repeat type 0."""
     most = max(1, *map(len, types))
     default = np.array([DEFAULTS[name] for name in FIELDS])
@@ -221,59 +245,47 @@ def _pad_types(types: Sequence[NDArray[np.float64]]) -> NDArray[np.float32]:
     return padded
 
 
+def _report_match(entry: _Entry, match: MatchSamples, *, split: str) -> dict[str, Any]:
+    return {
+        "match_id": entry.match_id,
+        "name": entry.name,
+        "opponent": entry.opponent,
+        "side": "left" if entry.side > 0 else "right",
+        "split": split,
+        "frames": len(match.frames["cycle"]),
+        "rows": _by_kind(np.bincount(match.samples["kind"], minlength=len(CLONED_KINDS))),
+        "executed": int(match.samples["executed"].sum()),
+        "turn_zero": int(match.samples["turn_zero"].sum()),
+        "player_cycles": match.player_cycles,
+        "idle": match.idle,
+        "frozen": match.frozen,
+        "rules": [asdict(rule) for rule in match.rules],
+    }
+
+
+def _by_kind(counts: Iterable[int]) -> dict[str, int]:
+    return {kind.name.lower(): int(count) for kind, count in zip(CLONED_KINDS, counts, strict=True)}
+
+
 def _report(
-    config: DatasetConfig,
-    entries: Sequence[_Entry],
-    cleaned: Sequence[MatchSamples],
-    *,
-    splits: dict[str, layout.Split],
-    samples: dict[str, NDArray[Any]],
-    frames: dict[str, NDArray[Any]],
-    without_team: int,
+    config: DatasetConfig, matches: Sequence[dict[str, Any]], *, rows: NDArray[np.int64], without_team: int
 ) -> dict[str, Any]:
-    kinds = [kind.name.lower() for kind in CLONED_KINDS]
-
-    def by_kind(mask: NDArray[np.bool_]) -> dict[str, int]:
-        counts = np.bincount(samples["kind"][mask], minlength=len(kinds))
-        return dict(zip(kinds, map(int, counts), strict=True))
-
-    totals = [
-        {
-            "name": rule.name,
-            "before": sum(match.rules[index].before for match in cleaned),
-            "after": sum(match.rules[index].after for match in cleaned),
-        }
-        for index, rule in enumerate(cleaned[0].rules)
-    ]
-    by_rows = config.split is SplitBy.ROWS
-    match_of_sample = frames["match"][samples["frame"]]
-    matches = []
-    for index, (entry, match) in enumerate(zip(entries, cleaned, strict=True)):
-        split = splits[entry.match_id]
-        matches.append(
-            {
-                "match_id": entry.match_id,
-                "name": entry.name,
-                "opponent": entry.opponent,
-                "side": "left" if entry.side > 0 else "right",
-                "split": "rows" if by_rows and split is not layout.Split.UNSEEN else split.name.lower(),
-                "frames": len(match.frames["cycle"]),
-                "rows": by_kind(match_of_sample == index),
-                "player_cycles": match.player_cycles,
-                "idle": match.idle,
-                "frozen": match.frozen,
-                "rules": [asdict(rule) for rule in match.rules],
-            }
-        )
+    """The sums over all matches; ``rows`` is (n_splits, n_kinds)."""
     return {
         "team": config.team,
         "matches_without_team": without_team,
-        "rules": totals,
-        "rows": {split.name.lower(): by_kind(samples["split"] == split) for split in layout.Split},
-        "executed": int(samples["executed"].sum()),
-        "turn_zero": int(samples["turn_zero"].sum()),
-        "player_cycles": sum(match.player_cycles for match in cleaned),
-        "idle": sum(match.idle for match in cleaned),
-        "frozen": sum(match.frozen for match in cleaned),
-        "matches": matches,
+        "rules": [
+            {
+                "name": same[0]["name"],
+                "before": sum(rule["before"] for rule in same),
+                "after": sum(rule["after"] for rule in same),
+            }
+            for same in zip(*(match["rules"] for match in matches), strict=True)
+        ],
+        "rows": {split.name.lower(): _by_kind(rows[split]) for split in layout.Split},
+        **{
+            name: sum(match[name] for match in matches)
+            for name in ("executed", "turn_zero", "player_cycles", "idle", "frozen")
+        },
+        "matches": list(matches),
     }

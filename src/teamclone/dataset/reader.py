@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,13 @@ Rows = NDArray[np.int64] | Tensor
 """Indices of samples, (batch,) int64."""
 
 _DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
-_STEPS = torch.from_numpy(STEPS)
 _CLASS_OF_KIND = torch.full((max(CommandKind) + 1,), -1, dtype=torch.int64)
 _CLASS_OF_KIND[torch.tensor(CLONED_KINDS)] = torch.arange(len(CLONED_KINDS))
+
+
+@cache
+def _steps(device: torch.device) -> Tensor:
+    return torch.from_numpy(STEPS).to(device)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +75,20 @@ class Dataset:
         """What is known of each match: ``match_id``, ``opponent``, ``side``, ``split`` and more."""
         return list(self.meta["matches"])
 
+    @property
+    def nbytes(self) -> int:
+        """Size of all arrays."""
+        return sum(array.nbytes for array in (*self.frames.values(), *self.samples.values(), self.player_types))
+
+    def to(self, device: torch.device) -> Dataset:
+        """The same with all arrays in the memory of a device, where ``rows`` have to lie and answers will."""
+        return replace(
+            self,
+            frames={name: array.to(device) for name, array in self.frames.items()},
+            samples={name: array.to(device) for name, array in self.samples.items()},
+            player_types=self.player_types.to(device),
+        )
+
     def split(self, split: Split) -> NDArray[np.int64]:
         """The samples of a split, ascending."""
         return np.flatnonzero(self.samples["split"].numpy() == int(split))
@@ -79,12 +98,10 @@ class Dataset:
         rows = torch.as_tensor(rows)
         frame = self.samples["frame"].index_select(0, rows)
         detail = self.frames["detail"].index_select(0, frame)
-        players = torch.empty(len(rows), 22, len(PLAYER_CHANNELS))
+        players = torch.empty(len(rows), 22, len(PLAYER_CHANNELS), device=rows.device)
         players[..., :2] = self.frames["position"].index_select(0, frame)
-        torch.mul(detail, _STEPS, out=players[..., 2:])
-        missing = detail == MISSING
-        if missing.any():
-            players[..., 2:].masked_fill_(missing, math.nan)
+        torch.mul(detail, _steps(rows.device), out=players[..., 2:])
+        players[..., 2:].masked_fill_(detail == MISSING, math.nan)
         n_types = self.player_types.shape[1]
         place = self.frames["match"].index_select(0, frame)[:, None] * n_types + detail[..., _DETAIL["type"]]
         types = self.player_types.reshape(-1, len(FIELDS)).index_select(0, place.reshape(-1))

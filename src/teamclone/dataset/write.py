@@ -1,12 +1,15 @@
-"""Writes a dataset to disk: all of it or nothing. The layout is `dataset/layout.py`."""
+"""Writes a dataset to disk, match by match: all of it or nothing. The layout is `dataset/layout.py`."""
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
 import shutil
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,190 @@ from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.rcss.player_types import FIELDS
 
 _TYPE = [channel.name for channel in DETAIL_CHANNELS].index("type")
+_TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
+
+
+class DatasetWriter:
+    """A dataset that grows. What it holds in memory does not."""
+
+    def __init__(self, folder: Path, *, where: Path) -> None:
+        """Of an empty folder; ``where`` is its name in errors. Use ``writing_dataset``."""
+        self._folder = folder
+        self._where = where
+        self._files: dict[tuple[str, str], _ArrayFile] = {}
+        for table, arrays in _TABLES.items():
+            (folder / table).mkdir()
+            for array in arrays:
+                self._files[table, array.name] = _ArrayFile(folder / table / f"{array.name}.npy", array)
+        self._ranges: dict[str, tuple[int, int]] = {}
+        self.finished = False
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames were added."""
+        return self._files["frames", "match"].rows
+
+    @property
+    def n_samples(self) -> int:
+        return self._files["samples", "frame"].rows
+
+    def add(self, *, frames: Mapping[str, NDArray[Any]], samples: Mapping[str, NDArray[Any]]) -> None:
+        """Append rows.
+
+        Args:
+            frames: FRAME_ARRAYS by name, shape (n_frames, ...).
+            samples: SAMPLE_ARRAYS by name, shape (n_samples, ...); ``frame`` counts from the dataset's first.
+
+        Raises:
+            DatasetError: the arrays do not fit the layout.
+        """
+        for table, given in (("frames", frames), ("samples", samples)):
+            for name, values in _rows(_TABLES[table], given, where=f"{self._where}/{table}").items():
+                self._files[table, name].append(values)
+        for name, values in (
+            ("frames/match", frames["match"]),
+            ("frames/detail type", frames["detail"][..., _TYPE]),
+            ("samples/frame", samples["frame"]),
+            ("samples/player", samples["player"]),
+            ("samples/kind", samples["kind"]),
+            ("samples/split", samples["split"]),
+        ):
+            if values.size:
+                least, most = self._ranges.get(name, (0, -1))
+                self._ranges[name] = min(least, int(values.min())), max(most, int(values.max()))
+
+    def finish(self, *, player_types: NDArray[np.floating], meta: Mapping[str, Any]) -> None:
+        """Complete the dataset.
+
+        Args:
+            player_types: (n_matches, n_types, len(FIELDS)), SI units; unused types of a match as type 0.
+            meta: goes into ``dataset.json``; must hold ``team`` and ``matches``, a list of dictionaries, one per match.
+
+        Raises:
+            DatasetError: what was added does not fit together.
+        """
+        missing = [key for key in ("team", "matches") if key not in meta]
+        if missing:
+            raise DatasetError(f"{self._where}: dataset.json needs {', '.join(missing)}")
+        types = np.ascontiguousarray(player_types, np.float32)
+        self._check_references(types, len(meta["matches"]))
+        array = Array(name="player_types", dtype="float32", shape=types.shape[1:], about="")
+        self._files["", array.name] = _ArrayFile(self._folder / f"{array.name}.npy", array)
+        self._files["", array.name].append(types)
+        digest = hashlib.blake2b(digest_size=8)
+        for file in self._files.values():
+            digest.update(file.finish())
+        document = {
+            "format": FORMAT,
+            "id": digest.hexdigest(),
+            **meta,
+            "n_frames": self.n_frames,
+            "n_samples": self.n_samples,
+        }
+        text = json.dumps(document, ensure_ascii=False, indent=2, default=str)
+        (self._folder / "dataset.json").write_text(text + "\n", encoding="utf-8")
+        self.finished = True
+
+    def close(self) -> None:
+        """Let go of the files, finished or not."""
+        for file in self._files.values():
+            file.close()
+
+    def _check_references(self, types: NDArray[np.float32], n_matches: int) -> None:
+        """Every index points at something: the readers gather without looking."""
+        if types.ndim != 3 or types.shape[0] != n_matches or types.shape[2] != len(FIELDS):
+            raise DatasetError(
+                f"{self._where}/player_types: expected shape ({n_matches}, types, {len(FIELDS)}), got {types.shape}"
+            )
+        stops = {
+            "frames/match": n_matches,
+            "frames/detail type": types.shape[1],
+            "samples/frame": self.n_frames,
+            "samples/player": 11,
+            "samples/kind": len(CLONED_KINDS),
+            "samples/split": len(Split),
+        }
+        for name, (least, most) in self._ranges.items():
+            if least < 0 or most >= stops[name]:
+                raise DatasetError(f"{self._where}/{name}: expected 0..{stops[name] - 1}, got {least}..{most}")
+
+
+class _ArrayFile:
+    """A .npy file that grows: its header is written again at the end, over the room that NumPy leaves for it."""
+
+    def __init__(self, path: Path, array: Array) -> None:
+        self._array = array
+        self._file = path.open("wb")
+        self._hash = hashlib.blake2b(digest_size=8)
+        self.rows = 0
+        self._room = self._write_header()
+
+    def append(self, values: NDArray[Any]) -> None:
+        data = values.tobytes()
+        self._file.write(data)
+        self._hash.update(data)
+        self.rows += len(values)
+
+    def finish(self) -> bytes:
+        """Complete the file; the hash of its content."""
+        self._file.seek(0)
+        if self._write_header() != self._room:
+            raise AssertionError("the header of an array outgrew its room")
+        self._file.close()
+        return self._hash.digest()
+
+    def close(self) -> None:
+        """Give the file up."""
+        with suppress(OSError):  # the disk may be full
+            self._file.close()
+
+    def _write_header(self) -> int:
+        """Write it where the file is; how long it is."""
+        dtype, start = np.dtype(self._array.dtype), self._file.tell()
+        np.lib.format.write_array_header_1_0(
+            self._file, {"descr": dtype.str, "fortran_order": False, "shape": (self.rows, *self._array.shape)}
+        )
+        return self._file.tell() - start
+
+
+@contextmanager
+def writing_dataset(folder: Path | str, *, replace: bool = False) -> Iterator[DatasetWriter]:
+    """A writer of a dataset, whose folder appears when it is finished; otherwise nothing is left of it.
+
+    Args:
+        folder: where to.
+        replace: put it in the place of a dataset that is already there.
+
+    Raises:
+        DatasetError: something is already there, or the folder cannot be written.
+    """
+    folder = Path(folder)
+    if folder.exists() and not replace:
+        raise DatasetError(f"{folder}: already exists; choose another folder or remove it")
+    if folder.exists() and not (folder / "dataset.json").is_file():
+        raise DatasetError(f"{folder}: is not a dataset, so it is not replaced; choose another folder")
+    with _in_words(folder):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        _tidy(folder)
+        temporary = _part(folder, str(os.getpid()))
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.mkdir()
+        try:
+            with _held(temporary):
+                writer = DatasetWriter(temporary, where=folder)
+                try:
+                    yield writer
+                finally:
+                    writer.close()
+                if not writer.finished:
+                    return
+                old = _part(folder, f"{os.getpid()}.old")
+                if folder.exists():
+                    folder.rename(old)
+                temporary.rename(folder)
+                shutil.rmtree(old, ignore_errors=True)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_dataset(
@@ -30,60 +217,11 @@ def write_dataset(
     meta: Mapping[str, Any],
     replace: bool = False,
 ) -> Path:
-    """Write a dataset; the folder appears complete or not at all.
-
-    Args:
-        folder: where to.
-        frames: FRAME_ARRAYS by name, shape (n_frames, ...).
-        samples: SAMPLE_ARRAYS by name, shape (n_samples, ...).
-        player_types: (n_matches, n_types, len(FIELDS)), SI units; unused types of a match as type 0.
-        meta: goes into ``dataset.json``; must hold ``team`` and ``matches``, a list of dictionaries, one per match.
-        replace: put it in the place of a dataset that is already there.
-
-    Raises:
-        DatasetError: the arrays do not fit the layout or each other, or something is already there.
-    """
-    folder = Path(folder)
-    if folder.exists() and not replace:
-        raise DatasetError(f"{folder}: already exists; choose another folder or remove it")
-    if folder.exists() and not (folder / "dataset.json").is_file():
-        raise DatasetError(f"{folder}: is not a dataset, so it is not replaced; choose another folder")
-    missing = [key for key in ("team", "matches") if key not in meta]
-    if missing:
-        raise DatasetError(f"{folder}: dataset.json needs {', '.join(missing)}")
-    tables = {
-        "frames": _rows(FRAME_ARRAYS, frames, where=f"{folder}/frames"),
-        "samples": _rows(SAMPLE_ARRAYS, samples, where=f"{folder}/samples"),
-    }
-    types = np.ascontiguousarray(player_types, np.float32)
-    _check_references(tables, types, len(meta["matches"]), where=str(folder))
-
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    digest = hashlib.blake2b(digest_size=8)
-    try:
-        for table, arrays in tables.items():
-            (temporary / table).mkdir(parents=True)
-            for name, values in arrays.items():
-                np.save(temporary / table / f"{name}.npy", values)
-                digest.update(values.data)
-        np.save(temporary / "player_types.npy", types)
-        digest.update(types.data)
-        document = {
-            "format": FORMAT,
-            "id": digest.hexdigest(),
-            **meta,
-            "n_frames": len(tables["frames"]["match"]),
-            "n_samples": len(tables["samples"]["frame"]),
-        }
-        text = json.dumps(document, ensure_ascii=False, indent=2, default=str)
-        (temporary / "dataset.json").write_text(text + "\n", encoding="utf-8")
-        if folder.exists():
-            shutil.rmtree(folder)
-        temporary.rename(folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    return folder
+    """Write a dataset that lies in memory. Arguments and errors as of ``DatasetWriter`` and ``writing_dataset``."""
+    with writing_dataset(folder, replace=replace) as writer:
+        writer.add(frames=frames, samples=samples)
+        writer.finish(player_types=player_types, meta=meta)
+    return Path(folder)
 
 
 def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: str) -> dict[str, NDArray[Any]]:
@@ -100,23 +238,47 @@ def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: 
     return rows
 
 
-def _check_references(
-    tables: dict[str, dict[str, NDArray[Any]]], types: NDArray[np.float32], n_matches: int, *, where: str
-) -> None:
-    """Every index points at something: the readers gather without looking."""
-    frames, samples = tables["frames"], tables["samples"]
-    if types.ndim != 3 or types.shape[0] != n_matches or types.shape[2] != len(FIELDS):
-        raise DatasetError(
-            f"{where}/player_types: expected shape ({n_matches}, types, {len(FIELDS)}), got {types.shape}"
-        )
-    bounds = (
-        ("frames/match", frames["match"], n_matches),
-        ("frames/detail type", frames["detail"][..., _TYPE], types.shape[1]),
-        ("samples/frame", samples["frame"], len(frames["match"])),
-        ("samples/player", samples["player"], 11),
-        ("samples/kind", samples["kind"], len(CLONED_KINDS)),
-        ("samples/split", samples["split"], len(Split)),
-    )
-    for name, values, stop in bounds:
-        if len(values) and not (values.min() >= 0 and values.max() < stop):
-            raise DatasetError(f"{where}/{name}: expected 0..{stop - 1}, got {values.min()}..{values.max()}")
+def _part(folder: Path, what: str) -> Path:
+    """A folder beside the dataset for what is not finished."""
+    return folder.with_name(f".{folder.name}.{what}.part")
+
+
+def _tidy(folder: Path) -> None:
+    """Remove what killed writers of this dataset left."""
+    for left in folder.parent.iterdir():
+        if left.name.startswith(f".{folder.name}.") and left.suffix == ".part":
+            with suppress(OSError), _held(left):  # unless its writer lives
+                shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Lock a folder for this process; the system lets go of it when the process ends, however it ends.
+
+    Raises:
+        BlockingIOError: another process holds it.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def _in_words(folder: Path) -> Iterator[None]:
+    """Turn the system's refusal to write into one clear line."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            text = "the disk is full; make room, or choose another folder"
+        else:
+            text = f"cannot be written ({error.strerror or error}); choose another folder"
+        raise DatasetError(f"{folder}: {text}") from error

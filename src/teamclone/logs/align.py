@@ -17,6 +17,9 @@ from teamclone.rcss.commands import BODY_KINDS, CommandKind
 
 _STOPPAGES = 1 << 20
 
+_IS_BODY = np.zeros(256, np.bool_)
+_IS_BODY[list(BODY_KINDS)] = True
+
 
 def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, has_stoppage: bool) -> NDArray[np.int32]:
     """Index of the frame of each (cycle, stoppage), shape of ``cycle``; -1 where there is none.
@@ -24,13 +27,17 @@ def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, ha
     Without stoppage counters (servers 12.x) a stamp inside a stoppage cannot be told from its neighbours: -1.
     """
     keys = frames["cycle"].astype(np.int64) * _STOPPAGES + frames["stoppage"]
-    wanted = cycle.astype(np.int64) * _STOPPAGES + stoppage
-    if not len(keys):
-        return np.full(len(wanted), -1, np.int32)
+    if not len(keys) or not len(cycle):
+        return np.full(len(cycle), -1, np.int32)
+    # A log has dozens of commands in a row with one stamp: each row is looked up once.
+    changes = (cycle[1:] != cycle[:-1]) | (stoppage[1:] != stoppage[:-1])
+    first = np.concatenate([[0], np.flatnonzero(changes) + 1])
+    wanted = cycle[first].astype(np.int64) * _STOPPAGES + stoppage[first]
     by_key = np.argsort(keys, kind="stable")
     place = np.minimum(np.searchsorted(keys[by_key], wanted), len(keys) - 1)
     found = by_key[place]
-    bound = np.where(keys[found] == wanted, found, -1).astype(np.int32)
+    found = np.where(keys[found] == wanted, found, -1).astype(np.int32)
+    bound = np.repeat(found, np.diff(first, append=len(cycle)))
     if not has_stoppage:
         cycles, counts = np.unique(frames["cycle"], return_counts=True)
         bound[np.isin(cycle, cycles[counts > 1])] = -1
@@ -54,15 +61,18 @@ def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_
         playmode: (n_frames,) of the match.
         play_on: id of the play mode in which ``move`` is not allowed.
     """
-    body = np.isin(commands["kind"], BODY_KINDS) & commands["valid"] & (commands["frame"] >= 0) & (commands["unum"] > 0)
+    body = _IS_BODY.take(commands["kind"])
+    body &= commands["valid"]
+    body &= commands["frame"] >= 0
+    body &= commands["unum"] > 0
     index = np.flatnonzero(body)
     mode = playmode[commands["frame"][index]]
     index = index[~((commands["kind"][index] == CommandKind.MOVE) & (mode == play_on))]
     slot = slot_of(commands["side"][index], commands["unum"][index])
     key = commands["frame"][index].astype(np.int64) * N_PLAYERS + slot
-    _, first = np.unique(key, return_index=True)  # the first of equal keys, in log order
-    kept: NDArray[np.int64] = index[first]
-    return kept
+    first = np.full(len(playmode) * N_PLAYERS, -1, np.int64)
+    first[key[::-1]] = index[::-1]  # of those with one key the last written stays: the first in the log
+    return first[first >= 0]
 
 
 def follows(frames: Columns) -> NDArray[np.bool_]:

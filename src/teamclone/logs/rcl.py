@@ -9,9 +9,9 @@ import numpy as np
 
 from teamclone.errors import LogError
 from teamclone.logs import scan
-from teamclone.logs.columns import COMMANDS, EVENTS
+from teamclone.logs.columns import EVENTS
 from teamclone.logs.match import Columns, CommandLog, Problem, Severity, empty_columns
-from teamclone.logs.rcg_text import line_bounds
+from teamclone.logs.rcg_text import count_byte, line_bounds
 
 FIRST_LINE = re.compile(rb"\s*\d{1,9}(,\d{1,9})?\t")
 """What a command log begins with."""
@@ -33,32 +33,39 @@ def read_commands(data: bytes, *, left: str | None, right: str | None, path: Pat
     """
     buffer = np.frombuffer(data, np.uint8)
     starts, stops = line_bounds(buffer)
-    capacity = int(np.count_nonzero(buffer == 40)) + len(starts)
-    made = empty_columns(COMMANDS, capacity)
+    capacity = count_byte(buffer, ord("(")) + len(starts)
+    # In few large arrays, which the system backs with large pages: each first touch of a small one costs a fault.
+    integers = np.empty((4, capacity), np.int32)
+    small = np.empty((5, capacity), np.uint8)
     args = np.empty((4, capacity), np.float32)
-    text_starts, text_stops = np.zeros(capacity, np.int64), np.zeros(capacity, np.int64)
-    classes = np.zeros(len(starts), np.uint8)
-    stamps = np.zeros((len(starts), 2), np.int32)
+    texts = np.empty((2, capacity), np.int64)
+    made: Columns = {
+        **dict(zip(("cycle", "stoppage", "line", "order"), integers, strict=True)),
+        **dict(zip(("side", "unum", "kind", "legs", "valid"), small, strict=True)),
+        **dict(zip(("arg0", "arg1", "arg2", "arg3"), args, strict=True)),
+        **dict(zip(("text_start", "text_stop"), texts, strict=True)),
+    }
+    made["side"] = made["side"].view(np.int8)
+    made["valid"] = made["valid"].view(np.bool_)
+    classes = np.empty(len(starts), np.uint8)
+    stamps = np.empty((len(starts), 2), np.int32)
     n = scan.scan_commands(
         buffer,
         starts,
         stops,
         np.frombuffer((left or "").encode(), np.uint8),
         np.frombuffer((right or "").encode(), np.uint8),
-        made["cycle"],
-        made["stoppage"],
-        made["line"],
-        made["order"],
+        integers,
         made["side"],
         made["unum"],
         made["kind"],
         made["legs"],
         made["valid"],
         args,
-        text_starts,
-        text_stops,
+        texts,
         classes,
         stamps,
+        np.empty((3, 12, 3), np.int64),
     )
     stamped = stamps[:, 0] >= 0
     if not stamped.any():
@@ -66,10 +73,8 @@ def read_commands(data: bytes, *, left: str | None, right: str | None, path: Pat
     # A log that ends inside a line was cut off: its last command is not what the player sent.
     cut = not data.endswith(b"\n") and n > 0 and made["line"][n - 1] == len(starts) and not made["valid"][n - 1]
     n -= cut
-    # Copies free the capacity that was allocated for the worst case.
-    commands: Columns = {name: values[:n].copy() for name, values in made.items()}
-    commands |= {f"arg{index}": args[index, :n].copy() for index in range(4)}
-    commands |= {"text_start": text_starts[:n].copy(), "text_stop": text_stops[:n].copy()}
+    # Views of the arrays for the worst case: what lies behind n was never touched and takes no memory.
+    commands: Columns = {"frame": np.zeros(n, np.int32)} | {name: values[:n] for name, values in made.items()}
     has_stoppage = bool((stamps[stamped, 1] >= 0).any())
     np.maximum(commands["stoppage"], 0, out=commands["stoppage"])
     events, event_texts = _events(data, starts, stops, classes, stamps)

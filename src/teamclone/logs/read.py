@@ -285,10 +285,11 @@ def _read_log(rcl: _Source, game: GameLog, problems: list[Problem]) -> CommandLo
     frame = frame_of(game.frames, log.commands["cycle"], log.commands["stoppage"], has_stoppage=log.has_stoppage)
     log = replace(log, commands=log.commands | {"frame": frame})
     teams = {name for name in (game.left.name, game.right.name) if name}
-    senders = set(sender_names(rcl.data))
+    # Where each line was read there is no sender but the teams, and no need to list them.
+    senders = teams if all(problem.code == "refused-command" for problem in log.problems) else _senders(rcl)
     if len(game.frames["cycle"]) and ((senders - teams and teams - senders) or _foreign(game, log)):
         text = (
-            f"is the command log of another match (teams {', '.join(sorted(senders)) or 'unknown'}, "
+            f"is the command log of another match (teams {', '.join(sorted(_senders(rcl))) or 'unknown'}, "
             f"expected {', '.join(sorted(teams)) or 'none'}); left out"
         )
         problems.append(Problem(code="mismatched", severity=Severity.ERROR, text=text, path=rcl.path))
@@ -296,22 +297,23 @@ def _read_log(rcl: _Source, game: GameLog, problems: list[Problem]) -> CommandLo
     return log
 
 
+def _senders(rcl: _Source) -> set[str]:
+    return set(sender_names(rcl.data))
+
+
 def _foreign(game: GameLog, log: CommandLog) -> bool:
     """Whether the server executed hardly any of the logged commands, so that the logs are of two matches."""
     commands = log.commands
     index = first_body_commands(commands, game.frames["playmode"], play_on=PlayMode.PLAY_ON)
     frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
-    kind = executed_kind(game.frames, game.players)
-    counted = (
-        (game.frames["playmode"][frame] == PlayMode.PLAY_ON)
-        & follows(game.frames)[frame]
-        & (game.players["count_dash"][frame, slot] >= 0)
-        & (game.players["state"][frame, slot] != 0)
-    )
+    executed = executed_kind(game.frames, game.players)
+    sent = np.zeros_like(executed)
+    sent[frame, slot] = commands["kind"][index]
+    counted = (sent != 0) & (game.players["count_dash"] >= 0) & (game.players["state"] != 0)
+    counted &= ((game.frames["playmode"] == PlayMode.PLAY_ON) & follows(game.frames))[:, np.newaxis]
     if counted.sum() < N_PLAYERS:
         return False
-    same = kind[frame, slot][counted] == commands["kind"][index][counted]
-    return bool(same.mean() < _FEWEST_EXECUTED)
+    return bool((executed == sent)[counted].mean() < _FEWEST_EXECUTED)
 
 
 def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:

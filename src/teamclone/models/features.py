@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol, cast
+from typing import Protocol
 
 import torch
 from torch import Tensor, nn
@@ -77,11 +77,12 @@ class PaperFeatures(nn.Module):
     """
 
     channels = ("x", "y", "vx", "vy", "body")
+    ball_limit: Tensor
 
     def __init__(self, *, own_type: bool = False, all_types: tuple[str, ...] = ()) -> None:
         super().__init__()
-        self.own_type = _TypeParameters(tuple(GROUPS)) if own_type else None
-        self.all_types = _TypeParameters(all_types) if all_types else None
+        self.own_type = TypeParameters(tuple(GROUPS)) if own_type else None
+        self.all_types = TypeParameters(all_types) if all_types else None
         order = ("x", "y", "body", "vx", "vy")
         names = [f"ball_{name}" for name in ("x", "y", "vx", "vy")]
         names += [f"{player}_{name}" for name in order for player in PLAYERS]
@@ -110,7 +111,7 @@ class PaperFeatures(nn.Module):
         )  # (batch, 5, 22)
         actor = state.actor[:, None, None]
         parts = [
-            state.ball / cast(Tensor, self.ball_limit),
+            state.ball / self.ball_limit,
             players.flatten(1),
             players.gather(2, actor.expand(-1, players.shape[1], 1)).squeeze(2),
         ]
@@ -130,9 +131,10 @@ class PaperFeatures(nn.Module):
         return normalised
 
 
-class _TypeParameters(nn.Module):
+class TypeParameters(nn.Module):
     """Parameters of player types projected onto [-1, 1] by what the server draws; (batch, parameter, player)."""
 
+    places: Tensor
     middle: Tensor
     half_range: Tensor
 
@@ -146,7 +148,7 @@ class _TypeParameters(nn.Module):
 
     def forward(self, types: Tensor) -> Tensor:
         """``types``: (batch, players, fields)."""
-        values = types.index_select(2, cast(Tensor, self.places)).transpose(1, 2)
+        values = types.index_select(2, self.places).transpose(1, 2)
         return (values - self.middle) / self.half_range
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Literal, NamedTuple
 
 import torch
@@ -27,18 +28,32 @@ class Loss(NamedTuple):
     parameter_mse: Tensor
 
 
+@cache
+def on(device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
+    """LIMITS, argument and kind of PARAMETERS on a device: copied there once, since a copy makes a GPU wait."""
+    return LIMITS.to(device), _ARGUMENT.to(device), _KIND.to(device)
+
+
 def issued(kind: Tensor) -> Tensor:
     """(batch, 6) bool: which of PARAMETERS belong to the command; ``kind`` is (batch,), index into CLONED_KINDS."""
-    return _KIND.to(kind.device) == kind[:, None]
+    return on(kind.device)[2] == kind[:, None]
 
 
 def projected_parameters(target: Target) -> Tensor:
     """(batch, 6) in [-1, 1]: PARAMETERS of the command given, zero for those of other commands (Table II)."""
-    values = target.parameters[:, _ARGUMENT.to(target.kind.device)] / LIMITS.to(target.kind.device)
+    limits, argument, _ = on(target.kind.device)
+    values = target.parameters.index_select(1, argument) / limits
     return torch.where(issued(target.kind), values, 0.0)
 
 
-def clone_loss(logits: Tensor, projected: Tensor, target: Target, *, parameter_loss: ParameterLoss = "paper") -> Loss:
+def clone_loss(
+    logits: Tensor,
+    projected: Tensor,
+    target: Target,
+    *,
+    parameter_loss: ParameterLoss = "paper",
+    whole: Tensor | None = None,
+) -> Loss:
     """Cross-entropy plus mean squared error, unweighted (section II-B of the paper).
 
     Args:
@@ -47,12 +62,14 @@ def clone_loss(logits: Tensor, projected: Tensor, target: Target, *, parameter_l
         target: what the players did.
         parameter_loss: "paper" takes the error over all six outputs, whose target is zero where the parameter was not
             issued; "masked" only over the issued ones.
+        whole: (n,) commands of the batch of which these samples are a share: the means are taken over it, so that the
+            losses of all shares add up to that of the batch. None where they are the batch.
     """
-    cross_entropy = functional.cross_entropy(logits, target.kind)
+    whole = target.kind if whole is None else whole
+    cross_entropy = functional.cross_entropy(logits, target.kind, reduction="sum") / len(whole)
     squared = (projected - projected_parameters(target)).square()
     if parameter_loss == "masked":
-        mask = issued(target.kind)
-        mse = (squared * mask).sum() / mask.sum()
+        mse = (squared * issued(target.kind)).sum() / issued(whole).sum()
     else:
-        mse = squared.mean()
+        mse = squared.sum() / (len(whole) * len(PARAMETERS))
     return Loss(cross_entropy + mse, cross_entropy, mse)

@@ -46,9 +46,16 @@ class PointHead(nn.Module):
         logits, projected = output
         return Prediction(logits, projected * self.limits)
 
-    def loss(self, output: tuple[Tensor, Tensor], target: Target, *, parameter_loss: ParameterLoss = "paper") -> Loss:
+    def loss(
+        self,
+        output: tuple[Tensor, Tensor],
+        target: Target,
+        *,
+        parameter_loss: ParameterLoss = "paper",
+        whole: Tensor | None = None,
+    ) -> Loss:
         logits, projected = output
-        return clone_loss(logits, projected, target, parameter_loss=parameter_loss)
+        return clone_loss(logits, projected, target, parameter_loss=parameter_loss, whole=whole)
 
 
 class Clone(nn.Module):
@@ -76,7 +83,11 @@ class Clone(nn.Module):
 
     def output(self, state: State) -> tuple[Tensor, Tensor]:
         """What the head answers, for ``head.loss`` and ``head.point``."""
-        answer: tuple[Tensor, Tensor] = self.head(self.trunk(self.features(state)))
+        return self.answer(self.features(state))
+
+    def answer(self, inputs: Tensor) -> tuple[Tensor, Tensor]:
+        """The same from what the features make of a state, (batch, columns)."""
+        answer: tuple[Tensor, Tensor] = self.head(self.trunk(inputs))
         return answer
 
     def forward(self, state: State) -> Prediction:

@@ -3,25 +3,49 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from teamclone import __version__
+from teamclone.logs import Problem
 from teamclone.logs.match import N_PLAYERS, Columns, Match
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.store import schema
 from teamclone.store.schema import Table
+from teamclone.store.status import digest
 
 Tables = dict[str, pa.Table]
 """Arrow tables by the names of ``schema.MATCH_TABLES``."""
 
 SIDES = np.repeat(np.array([1, -1], np.int8), N_PLAYERS // 2)
 UNUMS = np.tile(np.arange(1, N_PLAYERS // 2 + 1, dtype=np.uint8), 2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """Hashes of the contents that a match was read from; None for a log that there was not."""
+
+    game_log: str | None
+    command_log: str | None
+
+    def cover(self, others: Sources) -> bool:
+        """Whether a store that has these gains nothing by the others."""
+        return self == others or others.command_log is None
+
+
+def sources_of(match: Match) -> Sources:
+    """What a match was read from."""
+    return Sources(
+        game_log=match.match_id if match.rcg_path is not None or match.log is None else None,
+        command_log=digest(match.log.text) if match.log is not None else None,
+    )
 
 
 def tables_of(match: Match) -> Tables:
@@ -41,7 +65,11 @@ def tables_of(match: Match) -> Tables:
 
 
 def arrow_table(table: Table, values: dict[str, Any], *, match_id: str) -> pa.Table:
-    """Columns of one length (arrays or lists) as rows of a table: ``match_id`` added, not-a-number made NULL."""
+    """Columns of one length (arrays or lists) as rows of a table.
+
+    ``match_id`` is added, not-a-number made NULL. A zero byte in a text, which no SQL server keeps, becomes the
+    replacement character.
+    """
     wanted = schema.arrow_schema(table.fields)
     length = len(next(iter(values.values())))
     arrays = []
@@ -50,9 +78,8 @@ def arrow_table(table: Table, values: dict[str, Any], *, match_id: str) -> pa.Ta
             arrays.append(pa.repeat(pa.scalar(match_id, field.type), length))
         else:
             value = values[field.name]
-            arrays.append(
-                value if isinstance(value, pa.Array) else pa.array(_signed(value), type=field.type, from_pandas=True)
-            )
+            array = value if isinstance(value, pa.Array) else pa.array(_signed(value), field.type, from_pandas=True)
+            arrays.append(_without_zeros(array) if field.type == pa.string() else array)
     return pa.Table.from_arrays(arrays, schema=wanted)
 
 
@@ -61,6 +88,13 @@ def _signed(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.name in schema.SIGNED:
         return value.astype(schema.SIGNED[value.dtype.name])
     return value
+
+
+def _without_zeros(texts: pa.Array) -> pa.Array:
+    data = texts.buffers()[2]
+    if data is None or np.frombuffer(data, np.uint8).all():
+        return texts
+    return pc.replace_substring(texts, "\0", "\ufffd")
 
 
 def match_columns(match: Match, tables: Tables) -> dict[str, Any]:
@@ -113,9 +147,9 @@ def type_columns(match: Match) -> dict[str, Any]:
 
 
 def parameter_columns(match: Match) -> dict[str, Any]:
-    """``parameters``: those of the server, then those of the players."""
+    """``parameters``: those of the server, then those of the players, by name."""
     scopes = (("server", match.game.server_params), ("player", match.game.player_params))
-    rows = [(scope, name, value) for scope, parameters in scopes for name, value in parameters.items()]
+    rows = [(scope, name, value) for scope, parameters in scopes for name, value in sorted(parameters.items())]
     return {
         "scope": [scope for scope, _, _ in rows],
         "name": [name for _, name, _ in rows],
@@ -125,8 +159,8 @@ def parameter_columns(match: Match) -> dict[str, Any]:
 
 
 def problem_columns(match: Match) -> dict[str, Any]:
-    """``problems``: (n_problems,)."""
-    problems = match.problems
+    """``problems``: (n_problems,), by file and place."""
+    problems = sorted(match.problems, key=_place)
     return {
         "code": [problem.code for problem in problems],
         "severity": [str(problem.severity) for problem in problems],
@@ -136,6 +170,13 @@ def problem_columns(match: Match) -> dict[str, Any]:
         "byte": [problem.byte for problem in problems],
         "cycle": [problem.cycle for problem in problems],
     }
+
+
+def _place(problem: Problem) -> tuple[Any, ...]:
+    """What sorts problems as ``schema.PROBLEMS.order`` does."""
+    places = (-1 if place is None else place for place in (problem.byte, problem.line))
+    cycle = () if problem.cycle is None else (problem.cycle,)
+    return (_name(problem.path) or "", *places, problem.code, problem.text, str(problem.severity), cycle)
 
 
 def command_texts(match: Match) -> pa.Array:

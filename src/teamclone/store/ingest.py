@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import platform
 import time
 from collections.abc import Callable, Iterable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from teamclone.errors import LogError, TeamcloneError
+from teamclone.errors import LogError, TeamcloneError, UsageError
 from teamclone.logs import LogPair, Severity, find_matches, read_pair
 from teamclone.logs.match import Match
 from teamclone.store.status import FileStatus, Outcome, digest, stamp
-from teamclone.store.store import Added, Store, open_store
-from teamclone.store.workers import DIED, Died, run_tasks
+from teamclone.store.store import Added, Store
+from teamclone.store.workers import DIED, Died, SharedStore, run_tasks
 
 OnProgress = Callable[[int, int], None]
 """Called with the matches that are done and their number."""
@@ -50,23 +52,25 @@ class IngestReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Task:
-    location: str
+    store: SharedStore
     pair: LogPair
     strict: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Result:
-    """``added`` is None where nothing could be read."""
+    """``added`` is None where nothing could be read; ``machine`` is the one that tried."""
 
     statuses: tuple[FileStatus, ...]
-    added: Added | None = field(default=None)
+    added: Added | None = None
+    machine: str = field(default_factory=platform.node)
 
 
 def ingest(
     paths: Iterable[Path],
     store: Store,
     *,
+    executor: Executor | None = None,
     jobs: int | None = None,
     strict: bool = False,
     on_progress: OnProgress | None = None,
@@ -79,42 +83,54 @@ def ingest(
 
     Args:
         paths: logs and folders; a log finds its partner, folders are searched through.
-        jobs: processes, None for one a processor. More than one needs the usual ``if __name__ == "__main__"`` guard.
+        executor: where matches are read, for example on a cluster (``cluster.executor_of``); its workers must see the
+            logs and the store under the same paths. None starts processes on this machine.
+        jobs: how many, None for one a processor. More than one needs the usual ``if __name__ == "__main__"`` guard.
         strict: stop at the first file from which something is lost; what was added before stays.
 
     Raises:
-        UsageError: a path does not exist, or there is no log under any of them.
-        StoreError: the store cannot be written.
+        UsageError: a path does not exist, here or for a worker, or there is no log under any of them.
+        StoreError: the store cannot be written, or a worker does not see it.
+        ClusterError: the connection to the executor's workers was lost; what was added stays.
         LogError: with ``strict``, the first thing that was wrong.
     """
     start = time.monotonic()
-    pairs = find_matches(paths)
+    # Workers on other machines have another current folder.
+    pairs = find_matches(paths if executor is None else [path.absolute() for path in paths])
     counts = dict.fromkeys(Added, 0)
     with store.writing():
         known = {status.path: status for status in store.files()}
         present = set(store.match_ids())
         found: dict[str, FileStatus] = {}
+        shared = SharedStore.of(store)
         tasks = []
         for pair in pairs:
             before = _up_to_date(pair, known=known, present=present)
             if before is None:
-                tasks.append(_Task(location=store.location, pair=pair, strict=strict))
+                tasks.append(_Task(store=shared, pair=pair, strict=strict))
                 continue
             counts[Added.UNCHANGED] += 1
             found |= {status.path: status for status in before}
         done = len(pairs) - len(tasks)
         if on_progress is not None:
             on_progress(done, len(pairs))
-        for task, outcome in run_tasks(_ingest_one, tasks, jobs=jobs):
+        for task, outcome in run_tasks(_ingest_one, tasks, executor=executor, jobs=jobs):
             result = _died(task) if isinstance(outcome, Died) else outcome
+            if executor is not None:
+                _check_seen(result)
             if strict and outcome is DIED:
                 raise LogError(str(result.statuses[0].error), path=task.pair.path)
             store.save_files(result.statuses)
             if result.added is not None:
-                counts[result.added] += 1
+                # What a worker added before it died, the next one finds there.
+                ids = {status.match_id for status in result.statuses if status.match_id is not None}
+                new = result.added is Added.UNCHANGED and ids.isdisjoint(present)
+                counts[Added.ADDED if new else result.added] += 1
+                present |= ids
             _forget_superseded(store, result.statuses, known=known)
-            found |= {status.path: status for status in result.statuses}
-            known |= found
+            rows = {status.path: status for status in result.statuses}
+            found |= rows
+            known |= rows
             done += 1
             if on_progress is not None:
                 on_progress(done, len(pairs))
@@ -171,7 +187,17 @@ def _ingest_one(task: _Task) -> _Result:
         for status in statuses:
             if status.outcome is not Outcome.OK:
                 raise LogError(f"{status.error} (--strict)")
-    return _Result(statuses=statuses, added=open_store(task.location).add(match))
+    return _Result(statuses=statuses, added=task.store.open().add(match))
+
+
+def _check_seen(result: _Result) -> None:
+    """A log that is here but not there is a mistake of the cluster, which would cost every match."""
+    for status in result.statuses:
+        if status.size < 0 and Path(status.path).exists():
+            raise UsageError(
+                f"{status.path}: the worker on {result.machine} does not see this file; put the logs on a file system "
+                "that all machines have under the same path"
+            )
 
 
 def _status(match: Match, path: Path, stamped: tuple[int, int]) -> FileStatus:

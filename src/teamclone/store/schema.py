@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from teamclone.errors import UsageError
+from teamclone import __version__
+from teamclone.errors import StoreError, UsageError
 from teamclone.logs import columns
 from teamclone.logs.columns import Column
 from teamclone.rcss import player_types
@@ -61,13 +62,20 @@ class Field:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """One table: ``key`` names the columns that identify a row; ``rows`` are given where they are fixed."""
+    """One table.
+
+    Attributes:
+        key: the columns that identify a row.
+        rows: given where they are fixed.
+        order: what SQL sorts the rows of a match by, to have them in the order in which a store returns them.
+    """
 
     name: str
     about: str
     key: tuple[str, ...]
     fields: tuple[Field, ...]
     rows: tuple[tuple[int, str], ...] = ()
+    order: str = "match_id"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -154,6 +162,7 @@ FRAMES = Table(
     about="One row a frame of the game log: clock, play mode, score, ball.",
     key=("match_id", "frame"),
     fields=(MATCH_ID, FRAME, *_logged(columns.FRAMES)),
+    order="frame",
 )
 
 PLAYER_STATES = Table(
@@ -167,6 +176,7 @@ PLAYER_STATES = Table(
         Field(name="unum", dtype="int16", numpy="uint8", unit="", about="player's number, 1 to 11"),
         *_logged(columns.PLAYERS),
     ),
+    order="frame, side desc, unum",
 )
 
 COMMANDS = Table(
@@ -178,6 +188,7 @@ COMMANDS = Table(
         *_logged(columns.COMMANDS),
         _field("text", "string", "", "what it says besides numbers: the payload of say, `our 9` of attentionto"),
     ),
+    order='line, side, unum, "order"',
 )
 
 TYPE_FIELDS = {
@@ -207,6 +218,7 @@ PLAYER_TYPES = Table(
         Field(name="type", dtype="int16", numpy="uint8", unit="", about="id of the type; 0 is the default type"),
         *(_field(name, "float64", *TYPE_FIELDS[name]) for name in player_types.FIELDS),
     ),
+    order="type",
 )
 
 PARAMETERS = Table(
@@ -220,6 +232,7 @@ PARAMETERS = Table(
         _field("value", "float64", "", "its number, 0 or 1 for a truth value; NULL for text"),
         _field("text", "string", "", "its text; NULL for a number"),
     ),
+    order="scope desc, name",
 )
 
 EVENTS = Table(
@@ -227,6 +240,7 @@ EVENTS = Table(
     about="One row an announcement of the referee in the command log.",
     key=("match_id", "line"),
     fields=(MATCH_ID, *_logged(columns.EVENTS), _field("text", "string", "", "its words: `goal_l_1`, `kick_off_r`")),
+    order="line",
 )
 
 PROBLEMS = Table(
@@ -243,6 +257,8 @@ PROBLEMS = Table(
         _field("byte", "int64", "byte", "offset in the decompressed file, from 0; NULL where unknown"),
         _field("cycle", "int32", "cycle", "server time; NULL where unknown"),
     ),
+    # All columns: several problems may speak of one place.
+    order="file nulls first, byte nulls first, line nulls first, code, text, severity, cycle nulls first",
 )
 
 
@@ -283,6 +299,27 @@ def table(name: str) -> Table:
     return BY_NAME[name]
 
 
+def check_format(number: object, version: object, *, where: str, place: str) -> None:
+    """Refuse a store of another format number.
+
+    Args:
+        version: the teamclone that wrote it.
+        where: the store, for the message.
+        place: what else to ingest into: a folder, a schema.
+
+    Raises:
+        StoreError: the text names the numbers and the remedy.
+    """
+    if number == FORMAT:
+        return
+    newer = isinstance(number, int) and number > FORMAT
+    remedy = "update teamclone" if newer else f"ingest the logs anew into another {place}"
+    raise StoreError(
+        f"{where}: this store has format {number}, written by teamclone {version}, "
+        f"but teamclone {__version__} reads format {FORMAT}: {remedy}"
+    )
+
+
 def arrow_schema(fields: tuple[Field, ...]) -> pa.Schema:
     """Fields as an Arrow schema, with unit and meaning as metadata, so that a Parquet file explains itself."""
     import pyarrow as pa
@@ -320,6 +357,7 @@ def markdown() -> str:
         "<!-- Written by `teamclone.store.schema.markdown()`; `python -m` prints it, a test compares. -->",
         "",
         "The tables of a store, for `teamclone sql` and for any reader of its Parquet files or of `store.duckdb`.",
+        "What differs in a database server is said in [postgresql.md](postgresql.md).",
         "Positions are in metres in the server's frame: origin at the centre spot, +x towards the goal that the left",
         "team attacks, +y downwards on a monitor, angles in degrees from +x towards +y. Nothing is mirrored for the",
         "right team.",

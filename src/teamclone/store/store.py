@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from teamclone.errors import UsageError
 from teamclone.logs.match import Columns, Match
 from teamclone.store.status import FileStatus
 
@@ -37,12 +38,12 @@ class Rows:
 class Store(Protocol):
     """Many matches under one SQL schema (``teamclone.store.schema``).
 
-    Readers may work while one ingest writes: they see each match complete or not at all.
+    Readers may work while an ingest writes: they see each match complete or not at all.
     """
 
     @property
     def location(self) -> str:
-        """What ``open_store`` opens it by."""
+        """What ``open_store`` opens it by, in any process. It may hold a password, which its ``repr`` hides."""
 
     def match_ids(self) -> list[str]:
         """The matches, sorted."""
@@ -51,7 +52,7 @@ class Store(Protocol):
         """The table ``matches``, by start, file name and id."""
 
     def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
-        """The rows of one match in one table, in the order of its logs; ``columns`` None for all.
+        """The rows of one match in one table, by ``Table.order``; ``columns`` None for all.
 
         Raises:
             StoreError: there is no such match, or its rows cannot be read.
@@ -95,9 +96,10 @@ class Store(Protocol):
         """Keep the status of these files, in place of what was known of them."""
 
     def writing(self) -> AbstractContextManager[None]:
-        """Held by the one ingest that may write.
+        """Held by an ingest while it writes.
 
-        Tidies what a killed one left and, at the end, renews what other programs read.
+        A store in a folder takes one at a time, tidies what a killed one left and, at the end, renews what other
+        programs read; a server takes many.
 
         Raises:
             StoreError: another ingest holds it.
@@ -105,29 +107,54 @@ class Store(Protocol):
 
 
 def create_store(location: str | Path) -> Store:
-    """The store in this folder, made if the folder is missing or empty.
+    """The store in this folder, or in the schema that a URL ``postgresql://...`` names; made if there is none.
 
     Raises:
-        StoreError: the folder holds something else, or a store of another format.
+        StoreError: there is something else, or a store of another format; the server cannot be reached or refuses.
+        UsageError: the URL is wrong.
     """
+    if url := _url(location):
+        from teamclone.store.postgres import PostgresStore
+
+        return PostgresStore.create(url)
     from teamclone.store.parquet import ParquetStore
 
     return ParquetStore.create(Path(location))
 
 
 def open_store(location: str | Path) -> Store:
-    """The store in this folder.
+    """The store in this folder, or in the schema that a URL ``postgresql://...`` names.
 
     Raises:
-        StoreError: there is none, or it is of another format; the text names the numbers and the remedy.
+        StoreError: there is none, or it is of another format; the text names the numbers and the remedy. Or the server
+            cannot be reached or refuses.
+        UsageError: the URL is wrong.
     """
+    if url := _url(location):
+        from teamclone.store.postgres import PostgresStore
+
+        return PostgresStore.open(url)
     from teamclone.store.parquet import ParquetStore
 
     return ParquetStore.open(Path(location))
 
 
-def is_store(location: str | Path) -> bool:
+def is_store(location: Path) -> bool:
     """Whether this folder was made by ``create_store``, of whatever format."""
     from teamclone.store.parquet import MARKER
 
-    return (Path(location) / MARKER).is_file()
+    return (location / MARKER).is_file()
+
+
+def _url(location: str | Path) -> str | None:
+    """The location if it is a server's, else None.
+
+    Raises:
+        UsageError: it is the URL of something else.
+    """
+    if isinstance(location, Path) or "://" not in location:
+        return None
+    kind = location.partition("://")[0]
+    if kind not in ("postgresql", "postgres"):
+        raise UsageError(f"expected a folder or postgresql://USER:PASSWORD@HOST:PORT/DATABASE, got a {kind} URL")
+    return location

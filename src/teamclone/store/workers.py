@@ -1,16 +1,32 @@
-"""Tasks over processes, where the death of a process costs only its own task."""
+"""Tasks over processes, here or on a cluster, where the death of a process costs only its own task."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import platform
 import signal
+import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from typing import Final, TypeVar
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final, Self, TypeVar
+
+from teamclone.errors import ClusterError, StoreError
+from teamclone.store.status import stamp
+from teamclone.store.store import Store, open_store
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -23,6 +39,39 @@ class Died:
 DIED: Final = Died()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SharedStore:
+    """A store as a task carries it to another process, perhaps on another machine.
+
+    ``marker`` is the stamp of the file that makes a folder a store, so that a machine which has another folder at the
+    same place, or none, is noticed. A store that is no folder has none.
+    """
+
+    location: str
+    marker: tuple[int, int]
+
+    @classmethod
+    def of(cls, store: Store) -> Self:
+        return cls(location=store.location, marker=_marker(store.location))
+
+    def open(self) -> Store:
+        """The store, in the process that works on it.
+
+        Raises:
+            StoreError: this machine does not see it.
+        """
+        if _marker(self.location) != self.marker:
+            raise StoreError(
+                f"{self.location}: the worker on {platform.node()} does not see this store; put it on a file system "
+                "that all machines have under the same path"
+            )
+        return open_store(self.location)
+
+
+def _marker(location: str) -> tuple[int, int]:
+    return stamp(Path(location) / "store.json")
+
+
 def available_cpus() -> int:
     """The processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -31,61 +80,112 @@ def available_cpus() -> int:
 
 
 def run_tasks(
-    function: Callable[[T], R], tasks: Sequence[T], *, jobs: int | None = None
+    function: Callable[[T], R],
+    tasks: Sequence[T],
+    *,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+    ahead: int = 1024,
+    in_order: bool = False,
 ) -> Iterator[tuple[T, R | Died]]:
-    """Each task with its result, in the order in which they end.
+    """Each task with its result.
 
     Args:
         function: runs in another process, so it and the tasks must pickle. What it raises is raised here.
-        jobs: how many processes; None for one a processor. With one job, or one task, all runs in this process.
+        executor: where the tasks run, for example on a Dask cluster. None starts processes on this machine.
+        jobs: how many processes to start; None for one a processor. With one job, or one task, all runs in this
+            process.
+        ahead: how many tasks an executor is given before their results are taken, which bounds the memory.
+        in_order: give the results in the order of the tasks instead of that in which they end.
 
     After an error, or if the caller stops early, tasks that already run are waited for and the others are dropped.
+
+    Raises:
+        ClusterError: the executor dropped a task, because the connection to its workers was lost.
     """
+    if executor is not None:
+        yield from _run(function, tasks, executor=executor, ahead=ahead, in_order=in_order)
+        return
     jobs = min(jobs or available_cpus(), len(tasks))
     if jobs <= 1:
         for task in tasks:
             yield task, function(task)
         return
-    waiting = deque(tasks)
-    while waiting:
-        # Whoever was at work when a process died may have killed it: they are tried again, each alone.
-        suspects: list[T] = []
-        yield from _run_pool(function, waiting, jobs=jobs, unanswered=suspects)
-        for task in suspects:
-            unanswered: list[T] = []
-            yield from _run_pool(function, deque([task]), jobs=1, unanswered=unanswered)
-            if unanswered:
-                yield task, DIED
+    with Processes(jobs) as processes:
+        # For each task that runs another waits, so that no process does while results are taken.
+        yield from _run(function, tasks, executor=processes, ahead=2 * jobs, in_order=in_order)
 
 
-def _run_pool(
-    function: Callable[[T], R], waiting: deque[T], *, jobs: int, unanswered: list[T]
+def _run(
+    function: Callable[[T], R], tasks: Sequence[T], *, executor: Executor, ahead: int, in_order: bool
 ) -> Iterator[tuple[T, R | Died]]:
-    """Work off ``waiting`` until it is empty or the pool breaks, which moves the tasks in flight to ``unanswered``."""
-    # Spawned, not forked: threads of Arrow and DuckDB do not survive a fork.
-    context = multiprocessing.get_context("spawn")
+    waiting = iter(tasks)
     flying: dict[Future[R], T] = {}
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start_worker)
     try:
-        while waiting or flying:
-            try:
-                while waiting and len(flying) < jobs:
-                    flying[pool.submit(function, waiting[0])] = waiting[0]
-                    waiting.popleft()
-            except BrokenProcessPool:
-                unanswered += flying.values()
+        while True:
+            for task in islice(waiting, ahead - len(flying)):
+                flying[executor.submit(function, task)] = task
+            if not flying:
                 return
-            done, _ = wait(flying, return_when=FIRST_COMPLETED)
-            for future in done:
+            for future in wait(list(flying)[: 1 if in_order else None], return_when=FIRST_COMPLETED).done:
                 task = flying.pop(future)
                 try:
-                    result = future.result()
-                except BrokenProcessPool:
-                    unanswered += [task, *flying.values()]
-                    return
+                    result: R | Died = future.result()
+                except _deaths():
+                    result = DIED
+                except CancelledError:
+                    raise ClusterError(
+                        "the connection to the workers was lost; give the same command again when they are back"
+                    ) from None
                 yield task, result
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        for future in flying:
+            future.cancel()
+        wait(flying)
+
+
+def _deaths() -> tuple[type[Exception], ...]:
+    """What executors raise for a task whose process died each time it was tried."""
+    distributed = sys.modules.get("distributed")
+    return (BrokenExecutor,) if distributed is None else (BrokenExecutor, distributed.KilledWorker)
+
+
+class Processes(Executor):
+    """Processes on this machine, each served by a thread: a dead one is replaced and its task tried once more."""
+
+    def __init__(self, jobs: int) -> None:
+        self._threads = ThreadPoolExecutor(jobs, thread_name_prefix="teamclone")
+        self._own = threading.local()
+        self._pools: list[ProcessPoolExecutor] = []
+
+    def submit(self, function: Callable[..., R], /, *args: Any, **options: Any) -> Future[R]:
+        return self._threads.submit(self._call, function, *args, **options)
+
+    def _call(self, function: Callable[..., R], *args: Any, **options: Any) -> R:
+        try:
+            return self._pool().submit(function, *args, **options).result()
+        except BrokenExecutor:
+            self._own.pool = None
+        try:
+            return self._pool().submit(function, *args, **options).result()
+        except BrokenExecutor:
+            self._own.pool = None
+            raise
+
+    def _pool(self) -> ProcessPoolExecutor:
+        """The one process of this thread."""
+        pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
+        if pool is None:
+            # Spawned, not forked: threads of Arrow and DuckDB do not survive a fork.
+            context = multiprocessing.get_context("spawn")
+            pool = self._own.pool = ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker)
+            self._pools.append(pool)
+        return pool
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        for pool in self._pools:
+            pool.shutdown(wait)
 
 
 def _start_worker() -> None:

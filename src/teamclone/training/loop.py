@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, cast
@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, cast
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from teamclone.dataset.layout import Split
 from teamclone.dataset.order import epoch_order
@@ -21,16 +22,20 @@ from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.models.loss import ParameterLoss
 from teamclone.models.network import Clone
-from teamclone.models.state import CHANNEL, State, Target
+from teamclone.models.state import CHANNEL, State
 from teamclone.training.checkpoint import load_progress, save_progress, save_weights, write_atomic
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
-from teamclone.training.run import BEST, RESUME, Run, create_run, open_run, save_config
+from teamclone.training.feed import Feed
+from teamclone.training.group import joined, local_rank
+from teamclone.training.run import BEST, RESUME, Run, create_run, locked, open_run, save_config
 from teamclone.training.scores import Scores
 
 FIT_ROWS = 2**20
 """Training samples that the input normalisation is fitted on, evenly spread; more would not move it."""
 GATHER_ROWS = 16384
 """Rows gathered at once where the batch size does not matter; bounds memory."""
+ONEDNN_ACTIVATIONS = ("relu", "gelu")
+"""Those that PyTorch can take through oneDNN in single precision, forth and back."""
 
 
 class Progress(NamedTuple):
@@ -55,48 +60,57 @@ def train(
 
     Every epoch ends with a checkpoint from which ``resume`` goes on exactly as if nothing had happened: weights,
     order of the samples and figures are a pure function of config and dataset (on one machine, with as many threads).
+    Started by ``torchrun``, each process has a share of every batch; the result is the same but for rounding.
 
     Raises:
         UsageError: the machine lacks what the config asks for.
         DatasetError: the dataset lacks training or validation samples, or a value that the inputs need.
-        RunError: the folder holds a run already, or one that does not fit; or training diverged.
+        RunError: the folder holds a run already, or one that does not fit, or another process trains into it; or
+            training diverged.
     """
-    from torch.utils.tensorboard import SummaryWriter
+    with ExitStack() as stack:
+        device, precision = _resources(config.train)
+        group = stack.enter_context(joined(device))
+        rows = dataset.split(Split.TRAIN)
+        validation_rows = _validation_rows(config, dataset)
+        if not len(rows):
+            raise DatasetError(f"{dataset.path}: no training samples; make it again from more matches")
 
-    device, precision = _resources(config.train)
-    rows = dataset.split(Split.TRAIN)
-    validation_rows = _validation_rows(config, dataset)
-    if not len(rows):
-        raise DatasetError(f"{dataset.path}: no training samples; make it again from more matches")
-    folder = Path(run_folder)
-    if resume:
-        run = _continued(config, dataset, folder)
-    else:
-        run = create_run(folder, config, dataset, device=device.type, precision=precision)
+        def begin() -> Run:
+            folder = Path(run_folder)
+            if resume:
+                _check_resumable(config, dataset, open_run(folder))
+            else:
+                create_run(folder, config, dataset, device=device.type, precision=precision, processes=group.size)
+            stack.enter_context(locked(folder))
+            if resume:
+                save_config(folder, config)
+            return open_run(folder)
 
-    torch.manual_seed(config.train.seed)
-    model = Clone(config.model).to(device)
-    optimiser = _optimiser(config.train, model)
-    done = 0
-    if run.checkpoint_path(RESUME).is_file():
-        done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
-    else:
-        model.inputs.fit(model.inputs.project(state).cpu() for state in _whole_states(model, dataset, rows))
-        for _ in _whole_states(model, dataset, validation_rows):
-            pass  # Nothing may be missing there either.
-    history = run.history()[:done]
-    write_atomic(run.metrics_path, "".join(json.dumps(record) + "\n" for record in history).encode())
-
-    autocast = partial(torch.autocast, device.type, torch.bfloat16, enabled=precision == "bf16")
-    loss_kind = cast(ParameterLoss, config.train.parameter_loss)
-    batch_size = config.data.batch_size
-    began = time.monotonic()
-    with SummaryWriter(str(run.path / "tensorboard"), purge_step=done + 1) as board:
+        run = group.first(begin)
+        torch.manual_seed(config.train.seed)
+        model = Clone(config.model).to(device)
+        optimiser = _optimiser(config.train, model)
+        done = 0
+        if run.checkpoint_path(RESUME).is_file():
+            done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
+        else:
+            model.inputs.fit(model.inputs.project(state).cpu() for state in _whole_states(model, dataset, rows))
+            for _ in _whole_states(model, dataset, validation_rows):
+                pass  # Nothing may be missing there either.
+        group.share_weights(model)
+        feed = Feed(dataset, model, device, group)
+        answer_of = partial(answer, model, precision=precision)
+        loss_of = partial(model.head.loss, parameter_loss=cast(ParameterLoss, config.train.parameter_loss))
+        batch_size = config.data.batch_size
+        journal = stack.enter_context(Journal(run, done)) if group.rank == 0 else None
+        began = time.monotonic()
         for epoch in range(done + 1, config.train.epochs + 1):
             epoch_began = time.monotonic()
             if epoch > done + 1 and config.train.max_minutes:
                 pace = (epoch_began - began) / (epoch - done - 1)
-                if epoch_began + pace - began > 60 * config.train.max_minutes:
+                late = epoch_began + pace - began > 60 * config.train.max_minutes
+                if group.first(partial(bool, late)):
                     break
 
             torch.manual_seed(_mixed(config.train.seed, epoch))
@@ -105,69 +119,92 @@ def train(
             batches = math.ceil(len(order) / batch_size)
             scores = Scores(device)
             model.train()
-            for batch, (state, target) in enumerate(_batches(dataset, order, batch_size, device), 1):
-                with autocast():
-                    output = model.output(state)
-                loss = model.head.loss(output, target, parameter_loss=loss_kind)
+            for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size), 1):
+                output = answer_of(inputs)
+                loss = loss_of(output, target, whole=whole)
                 optimiser.zero_grad(set_to_none=True)
                 loss.total.backward()  # type: ignore[no-untyped-call]
+                group.add_up_gradients(model)
                 optimiser.step()
-                scores.add(loss, model.head.point(output), target)
+                scores.add(loss, model.head.point(output), target, batch=len(whole))
                 on_progress(Progress(epoch, config.train.epochs, batch, batches, None))
             record: dict[str, Any] = {"epoch": epoch, "samples": len(order)}
-            record |= {f"train_{name}": value for name, value in scores.table().items()}
+            record |= {f"train_{name}": value for name, value in scores.table(group).items()}
             record["samples_per_s"] = len(order) / (time.monotonic() - epoch_began)
             model.eval()
             scores = Scores(device)
-            with torch.no_grad(), autocast():
-                for state, target in _batches(dataset, validation_rows, batch_size, device):
-                    output = model.output(state)
-                    loss = model.head.loss(output, target, parameter_loss=loss_kind)
-                    scores.add(loss, model.head.point(output), target)
-            record |= {f"validation_{name}": value for name, value in scores.table().items()}
+            with torch.no_grad():
+                for inputs, target, whole in feed.batches(validation_rows, batch_size):
+                    output = answer_of(inputs)
+                    scores.add(loss_of(output, target, whole=whole), model.head.point(output), target, batch=len(whole))
+            record |= {f"validation_{name}": value for name, value in scores.table(group).items()}
             record["seconds"] = time.monotonic() - epoch_began
             if not (math.isfinite(record["train_loss"]) and math.isfinite(record["validation_loss"])):
                 kept = f"the checkpoints of epoch {epoch - 1} are kept" if epoch > 1 else "nothing is kept"
                 raise RunError(
                     f"{run.path}: the loss is not a number in epoch {epoch}; {kept}; try a smaller train.learning_rate"
                 )
-            _finish_epoch(run, model, optimiser, record, history)
-            for name, value in record.items():
-                group, _, figure = name.partition("_")
-                board.add_scalar(f"{group}/{figure}" if group in {"train", "validation"} else name, value, epoch)
+            if journal:
+                journal.write(record, model, optimiser)
             on_progress(Progress(epoch, config.train.epochs, batches, batches, record))
     return run
 
 
-def _finish_epoch(
-    run: Run, model: Clone, optimiser: torch.optim.Optimizer, record: dict[str, Any], history: list[dict[str, Any]]
-) -> None:
-    """Write all that an epoch leaves. A kill before the last line repeats the epoch, which writes the same again."""
-    epoch = record["epoch"]
-    with run.metrics_path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(record) + "\n")
-    for name, (figure, better) in BEST.items():
-        before = [past[figure] for past in history if figure in past]
-        if figure in record and all(better(float(record[figure]), float(value)) for value in before):
-            save_weights(run.checkpoint_path(name), model, epoch=epoch)
-    save_weights(run.checkpoint_path("last"), model, epoch=epoch)
-    history.append(record)
-    save_progress(run.checkpoint_path(RESUME), model, optimiser, epoch=epoch)
+def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"]) -> tuple[Tensor, Tensor]:
+    """What the head answers to normalised inputs, as `Clone.output` does but for rounding."""
+    if precision == "bf16":
+        with torch.autocast(inputs.device.type, torch.bfloat16):
+            return model.answer(inputs)
+    if inputs.device.type == "cpu" and len(inputs) and model.config.activation in ONEDNN_ACTIVATIONS:
+        # oneDNN instead of MKL, which takes twice the time on AMD, where it leaves AVX-512 unused.
+        hidden: Tensor = model.trunk(inputs.to_mkldnn()).to_dense()
+        return cast(tuple[Tensor, Tensor], model.head(hidden))
+    return model.answer(inputs)
 
 
-def _continued(config: Config, dataset: Dataset, folder: Path) -> Run:
-    """The run in a folder, if this config and dataset are its own."""
-    run = open_run(folder)
+class Journal:
+    """All that the epochs of a run leave in its folder, from epoch ``done`` + 1 on."""
+
+    def __init__(self, run: Run, done: int) -> None:
+        from torch.utils.tensorboard import SummaryWriter
+
+        self.run, self.history = run, run.history()[:done]
+        write_atomic(run.metrics_path, "".join(json.dumps(record) + "\n" for record in self.history).encode())
+        self.board = SummaryWriter(str(run.path / "tensorboard"), purge_step=done + 1)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.board.close()
+
+    def write(self, record: dict[str, Any], model: Clone, optimiser: torch.optim.Optimizer) -> None:
+        """Write an epoch. A kill before the last file repeats the epoch, which writes the same again."""
+        epoch, run = record["epoch"], self.run
+        with run.metrics_path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(record) + "\n")
+        for name, (figure, better) in BEST.items():
+            before = [past[figure] for past in self.history if figure in past]
+            if figure in record and all(better(float(record[figure]), float(value)) for value in before):
+                save_weights(run.checkpoint_path(name), model, epoch=epoch)
+        save_weights(run.checkpoint_path("last"), model, epoch=epoch)
+        self.history.append(record)
+        save_progress(run.checkpoint_path(RESUME), model, optimiser, epoch=epoch)
+        for name, value in record.items():
+            part, _, figure = name.partition("_")
+            self.board.add_scalar(f"{part}/{figure}" if part in {"train", "validation"} else name, value, epoch)
+
+
+def _check_resumable(config: Config, dataset: Dataset, run: Run) -> None:
+    """See that this config and dataset are those of the run."""
     if dataset.id != run.dataset_id:
         raise RunError(
-            f"{folder}: was trained on dataset {run.dataset_id} ({run.dataset_path}), {dataset.path} is {dataset.id}; "
-            "give the same dataset or begin a new run"
+            f"{run.path}: was trained on dataset {run.dataset_id} ({run.dataset_path}), "
+            f"{dataset.path} is {dataset.id}; give the same dataset or begin a new run"
         )
     changed = [text for text in differences(run.config, config) if text.partition(":")[0] not in MAY_CHANGE]
     if changed:
-        raise RunError(f"{folder}: cannot resume with other settings ({'; '.join(changed)}); begin a new run")
-    save_config(folder, config)
-    return open_run(folder)
+        raise RunError(f"{run.path}: cannot resume with other settings ({'; '.join(changed)}); begin a new run")
 
 
 def _resources(config: TrainConfig) -> tuple[torch.device, Literal["fp32", "bf16"]]:
@@ -176,7 +213,11 @@ def _resources(config: TrainConfig) -> tuple[torch.device, Literal["fp32", "bf16
         torch.set_num_threads(config.threads)
     if config.device == "cuda" and not torch.cuda.is_available():
         raise UsageError("train.device = cuda, but PyTorch finds no CUDA device here; use cpu or auto")
-    device = torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
+    if config.device != "cpu" and torch.cuda.is_available():
+        device = torch.device("cuda", local_rank() % torch.cuda.device_count())
+        torch.cuda.set_device(device)
+    else:
+        device = torch.device("cpu")
     bfloat = config.precision == "bf16" or (config.precision == "auto" and has_fast_bfloat16(device))
     return device, "bf16" if bfloat else "fp32"
 
@@ -195,7 +236,7 @@ def _optimiser(config: TrainConfig, model: Clone) -> torch.optim.Optimizer:
         return torch.optim.RMSprop(weights, lr=rate, eps=epsilon)
     if config.optimiser == "adagrad":
         return torch.optim.Adagrad(weights, lr=rate, eps=epsilon)
-    return torch.optim.Adam(weights, lr=rate, betas=(config.betas[0], config.betas[1]), eps=epsilon)
+    return torch.optim.Adam(weights, lr=rate, betas=(config.betas[0], config.betas[1]), eps=epsilon, fused=True)
 
 
 def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
@@ -210,23 +251,6 @@ def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
         return rows
     chosen = np.random.default_rng((config.train.seed, 2)).choice(len(rows), wanted, replace=False)
     return rows[np.sort(chosen)]
-
-
-def _batches(
-    dataset: Dataset, rows: NDArray[np.int64], batch_size: int, device: torch.device
-) -> Iterator[tuple[State, Target]]:
-    """Batches in order; the next one is gathered while one is used."""
-
-    def gather(start: int) -> tuple[State, Target]:
-        part = rows[start : start + batch_size]
-        return dataset.state(part), dataset.target(part)
-
-    with ThreadPoolExecutor(1) as pool:
-        ahead = pool.submit(gather, 0)
-        for start in range(0, len(rows), batch_size):
-            state, target = ahead.result()
-            ahead = pool.submit(gather, start + batch_size)
-            yield state.to(device), Target(*(tensor.to(device, non_blocking=True) for tensor in target))
 
 
 def _whole_states(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> Iterator[State]:

@@ -10,12 +10,15 @@ RUN/checkpoints/resume.safetensors  weights and optimiser after the last finishe
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import platform
 import shutil
+import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -176,7 +179,7 @@ def is_run(path: Path) -> bool:
     return (path / "environment.json").is_file()
 
 
-def create_run(path: Path, config: Config, dataset: Dataset, *, device: str, precision: str) -> Run:
+def create_run(path: Path, config: Config, dataset: Dataset, *, device: str, precision: str, processes: int = 1) -> Run:
     """Begin a run folder; ``device`` and ``precision`` are what ``auto`` came to on this machine.
 
     Raises:
@@ -186,17 +189,43 @@ def create_run(path: Path, config: Config, dataset: Dataset, *, device: str, pre
         raise RunError(f"{path}: already holds a run; add --resume to go on with it, or choose another folder")
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise RunError(f"{path}: is not an empty folder; choose another one")
-    text = json.dumps(_environment(dataset) | {"device": device, "precision": precision}, indent=2) + "\n"
+    resources = {"device": device, "precision": precision, "processes": processes}
+    text = json.dumps(_environment(dataset) | resources, indent=2) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         (temporary / "checkpoints").mkdir(parents=True)
         save_config(temporary, config)
         write_atomic(temporary / "environment.json", text.encode())
-        temporary.rename(path)
+        try:
+            temporary.rename(path)
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                raise
+            raise RunError(f"{path}: another process has just begun a run there; choose another folder") from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return open_run(path)
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold a run folder for this process; the system lets go of it when the process ends, however it ends.
+
+    Raises:
+        RunError: another process holds it.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    with (path / ".lock").open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RunError(f"{path}: another process is training into it; wait for its end") from None
+        yield
 
 
 def save_config(path: Path, config: Config) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from teamclone.models.loss import LIMITS, Loss, issued, projected_parameters
+from teamclone.models.loss import Loss, issued, on, projected_parameters
 from teamclone.models.network import Prediction
 from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.training.group import ALONE, Group
 
 _N = len(CLONED_KINDS)
 
@@ -17,36 +18,39 @@ class Scores:
     """Sums over all samples seen so far. They stay on the device: no batch waits for a number."""
 
     def __init__(self, device: torch.device) -> None:
-        self.sums = torch.zeros(6, dtype=torch.float64, device=device)
+        self.sums = torch.zeros(5, dtype=torch.float64, device=device)
         self.confusion = torch.zeros(_N * _N, dtype=torch.int64, device=device)
 
     @torch.no_grad()
-    def add(self, loss: Loss, prediction: Prediction, target: Target) -> None:
-        """Count one batch."""
+    def add(self, loss: Loss, prediction: Prediction, target: Target, *, batch: int | None = None) -> None:
+        """Count one batch, or a process's share of a ``batch`` of so many samples."""
         mask = issued(target.kind)
-        error = (prediction.parameters / LIMITS.to(mask.device) - projected_parameters(target)).abs()
+        error = (prediction.parameters / on(mask.device)[0] - projected_parameters(target)).abs()
+        n = len(mask) if batch is None else batch
         parts = (
-            loss.cross_entropy * len(mask),
-            loss.parameter_mse * len(mask),
-            error.mean(1).sum(),
+            loss.cross_entropy * n,
+            loss.parameter_mse * n,
+            error.sum() / error.shape[1],
             (error * mask).sum(),
             mask.sum(),
-            torch.tensor(len(mask), device=mask.device),
         )
         self.sums += torch.stack([part.detach().double() for part in parts])
         cells = target.kind * _N + prediction.logits.argmax(1)
-        self.confusion += torch.bincount(cells, minlength=_N * _N)
+        # Not bincount, for which a GPU has to tell the host how much there is to count.
+        self.confusion.index_add_(0, cells, torch.ones_like(cells))
 
-    def table(self) -> dict[str, float]:
-        """The figures; those of commands that never occurred are missing.
+    def table(self, group: Group = ALONE) -> dict[str, float]:
+        """The figures over all processes; those of commands that never occurred are missing.
 
         ``loss``, ``cross_entropy``, ``parameter_mse``: means per sample, of the training error and its parts.
         ``accuracy``, ``recall_<command>``.
         ``parameter_mae``: the paper's, over all six outputs in [-1, 1] with zeros for those not issued.
         ``issued_mae``: the same over issued parameters only.
         """
-        cross_entropy, mse, mae, issued_error, n_issued, n = self.sums.tolist()
+        group.add_up(self.sums, self.confusion)
+        cross_entropy, mse, mae, issued_error, n_issued = self.sums.tolist()
         confusion = self.confusion.reshape(_N, _N).cpu()
+        n = int(confusion.sum())
         values = {
             "loss": (cross_entropy + mse) / n,
             "cross_entropy": cross_entropy / n,

@@ -54,9 +54,11 @@ def test_fixed_matches_stay_and_fill_their_split() -> None:
 
 
 def test_the_row_split_is_the_papers() -> None:
-    split = split_rows(10_000, seed=3)
+    split = split_rows(10_000, match_id="a", seed=3)
     assert Counter(split.tolist()) == {Split.TRAIN: 9_500, Split.VALIDATION: 250, Split.TEST: 250}
     # At random: neighbours fall on both sides.
     held = np.flatnonzero(split != Split.TRAIN)
     assert (np.diff(held) > 1).mean() > 0.9
-    assert np.array_equal(split, split_rows(10_000, seed=3))
+    assert np.array_equal(split, split_rows(10_000, match_id="a", seed=3))
+    assert not np.array_equal(split, split_rows(10_000, match_id="b", seed=3))
+    assert not np.array_equal(split, split_rows(10_000, match_id="a", seed=4))

@@ -5,7 +5,7 @@ from math import log
 import pytest
 import torch
 
-from teamclone.models.loss import clone_loss, issued, projected_parameters
+from teamclone.models.loss import Loss, ParameterLoss, clone_loss, issued, projected_parameters
 from teamclone.models.state import Target
 
 TARGET = Target(
@@ -52,3 +52,26 @@ def test_no_gradient_reaches_parameters_that_the_mask_hides() -> None:
     clone_loss(torch.zeros(4, 4), predicted, TARGET, parameter_loss="masked").total.backward()
     assert predicted.grad is not None
     assert torch.equal(predicted.grad != 0, issued(TARGET.kind))
+
+
+@pytest.mark.parametrize("parameter_loss", ["paper", "masked"])
+def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterLoss) -> None:
+    """Also where the shares differ in length and in how many parameters were issued, and where one is empty."""
+    generator = torch.Generator().manual_seed(0)
+    kind = torch.tensor([0, 0, 1, 3, 2, 1, 1])
+    target = Target(kind, torch.rand(7, 2, generator=generator) * 90)
+    logits = torch.randn(7, 4, generator=generator, requires_grad=True)
+    projected = (torch.rand(7, 6, generator=generator) - 0.5).requires_grad_()
+
+    def loss_of(part: slice) -> Loss:
+        share = Target(kind[part], target.parameters[part])
+        return clone_loss(logits[part], projected[part], share, parameter_loss=parameter_loss, whole=kind)
+
+    whole = clone_loss(logits, projected, target, parameter_loss=parameter_loss)
+    expected = torch.autograd.grad(whole.total, (logits, projected))
+    shares = [loss_of(part) for part in (slice(0, 2), slice(2, 7), slice(7, 7))]
+    for together, *parts in zip(whole, *shares, strict=True):
+        assert float(sum(parts).detach()) == pytest.approx(float(together.detach()))
+    got = torch.autograd.grad(sum(share.total for share in shares), (logits, projected))
+    for one, other in zip(expected, got, strict=True):
+        assert torch.allclose(one, other)

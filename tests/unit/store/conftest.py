@@ -13,10 +13,12 @@ from teamclone.store import Store, create_store
 MakeStore = Callable[[], Store]
 
 
-@pytest.fixture(params=["parquet"])
+@pytest.fixture(params=["parquet", "postgresql"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
     """An empty store of every back end: what is tested with it is the contract of ``Store``."""
-    return {"parquet": lambda: create_store(tmp_path / "store")}[request.param]()
+    if request.param == "parquet":
+        return create_store(tmp_path / "store")
+    return create_store(request.getfixturevalue("postgres").new_url())
 
 
 def only_log(folder: Path, suffix: str) -> Path:

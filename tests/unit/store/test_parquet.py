@@ -89,6 +89,14 @@ def test_a_store_may_be_moved_anywhere(filled: Path, match: Match, name: str) ->
         assert other.execute("select count(*) from frames join playmodes on id = playmode").fetchone() == (n_frames,)
 
 
+def test_one_writer_at_a_time(filled: Path) -> None:
+    store = open_store(filled)
+    with store.writing(), pytest.raises(StoreError, match="another ingest"), store.writing():
+        pass
+    with store.writing():
+        pass
+
+
 def test_the_database_is_left_alone_when_it_is_right(filled: Path, match: Match) -> None:
     def stamp() -> int:
         return (filled / "store.duckdb").stat().st_mtime_ns

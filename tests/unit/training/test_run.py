@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,7 @@ from teamclone.errors import RunError
 from teamclone.models.network import Clone
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import Config, load_config
-from teamclone.training.run import create_run, open_run
+from teamclone.training.run import create_run, locked, open_run
 
 
 @pytest.fixture(scope="module")
@@ -120,3 +123,39 @@ def test_the_optimiser_goes_on_as_if_never_stopped(
     step(other, other_stepper)
     for name, tensor in model.state_dict().items():
         assert torch.equal(tensor, other.state_dict()[name])
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from teamclone.training.run import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(100)
+"""
+
+
+def test_one_process_at_a_time_trains_into_a_folder(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", HOLD, tmp_path], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout
+        assert other.stdout.readline() == "held\n"
+        with pytest.raises(RunError, match="another process is training into it"), locked(tmp_path):
+            pass
+        other.kill()
+        other.wait()
+    with locked(tmp_path):
+        pass
+
+
+def test_two_that_begin_at_once_do_not_mix(
+    tmp_path: Path, dataset: Dataset, config: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = partial(create_run, tmp_path / "run", config, dataset, device="cpu", precision="fp32")
+    monkeypatch.setattr("teamclone.training.run.is_run", lambda path: False)
+    monkeypatch.setattr(
+        "teamclone.training.run._environment", lambda dataset: (tmp_path / "run" / "theirs").mkdir(parents=True) or {}
+    )
+    with pytest.raises(RunError, match="another process has just begun a run there"):
+        begin()
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["theirs"]

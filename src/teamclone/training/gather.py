@@ -1,0 +1,182 @@
+"""The paper's inputs straight from the arrays of a dataset, in one compiled pass.
+
+`Dataset.state` gathers every channel of every player, most of which these inputs do not ask for. The arithmetic here is
+that of `features.PaperFeatures`, in the same order, so that the same bits come out; a test holds them together.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import torch
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+from torch import Tensor
+
+from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, STEPS
+from teamclone.dataset.reader import Dataset
+from teamclone.errors import DatasetError
+from teamclone.models.features import BODY_LIMIT_DEG, PaperFeatures, TypeParameters
+from teamclone.models.state import TYPE_FIELD
+from teamclone.rcss import pitch
+from teamclone.rcss.player_types import FIELDS
+
+_DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
+_VX, _VY, _BODY, _TYPE = (_DETAIL[name] for name in ("vx", "vy", "body", "type"))
+_VELOCITY_STEP, _BODY_STEP = STEPS[_VX], STEPS[_BODY]
+_MAX_X, _MAX_Y, _BODY_LIMIT = (np.float32(limit) for limit in (pitch.MAX_X, pitch.MAX_Y, BODY_LIMIT_DEG))
+_NAN = np.float32(math.nan)
+
+_FAR, _NEAR = 16, 4
+"""How many samples ahead a sample's own entries and those of its frame are asked for. A random frame lies in no cache:
+waiting for it takes three times as long as all arithmetic."""
+_FRAME_LINES, _POSITION_LINES = 9, 3
+"""Cache lines of 64 bytes of a frame's ``detail`` and ``position``."""
+
+
+class Gather:
+    """`PaperFeatures` of samples, on the processor; its normalisation is as it was when this was made."""
+
+    def __init__(self, dataset: Dataset, features: PaperFeatures) -> None:
+        frames, samples, kinds = dataset.frames, dataset.samples, dataset.player_types.numpy()
+        self.path = dataset.path
+        self.n_columns = len(features.names)
+        self.arguments: tuple[Any, ...] = (
+            *(samples[name].numpy() for name in ("frame", "player")),
+            *(frames[name].numpy() for name in ("match", "ball", "position", "detail")),
+            kinds.reshape(-1, len(FIELDS)),
+            kinds.shape[1],
+            (kinds[..., TYPE_FIELD["player_speed_max"]] * kinds[..., TYPE_FIELD["player_decay"]]).reshape(-1),
+            features.ball_limit.cpu().numpy(),
+            *_type_parameters(features.own_type),
+            *_type_parameters(features.all_types),
+            features.normalisation.mean.cpu().numpy(),
+            features.normalisation.std.cpu().numpy(),
+        )
+
+    def __call__(self, rows: NDArray[np.int64]) -> Tensor:
+        """(len(rows), columns) float32, normalised.
+
+        Raises:
+            DatasetError: an index in the arrays points at nothing.
+        """
+        inputs = torch.empty(len(rows), self.n_columns)
+        done: int = _gather(rows, inputs.numpy(), *self.arguments)
+        if done < len(rows):
+            raise DatasetError(
+                f"{self.path}: sample {rows[done]} points at nothing; make the dataset again with `teamclone dataset`"
+            )
+        return inputs
+
+
+def _type_parameters(parameters: TypeParameters | None) -> tuple[NDArray[Any], ...]:
+    """Field, middle and half range of the type parameters that are among the inputs."""
+    if parameters is None:
+        return np.empty(0, np.int64), np.empty(0, np.float32), np.empty(0, np.float32)
+    middle, half_range = (part.cpu().numpy()[:, 0] for part in (parameters.middle, parameters.half_range))
+    return parameters.places.cpu().numpy(), middle.copy(), half_range.copy()
+
+
+def _prefetch_code(typing_context: Any, array: Any, index: Any) -> Any:
+    """Ask for the cache line of the array's element ``index``, counted flat; nothing waits for it and nothing fails."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        element = builder.gep(context.make_array(array)(context, builder, arguments[0]).data, [arguments[1]])
+        address = builder.bitcast(element, ir.IntType(8).as_pointer())
+        flag = ir.IntType(32)
+        prefetch = builder.module.declare_intrinsic(
+            "llvm.prefetch", [address.type], ir.FunctionType(ir.VoidType(), [address.type, flag, flag, flag])
+        )
+        builder.call(prefetch, [address, flag(0), flag(3), flag(1)])  # to read, into the nearest cache, data
+        return context.get_dummy_value()
+
+    return types.void(array, index), generate
+
+
+_prefetch: Any = intrinsic(_prefetch_code)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _gather(
+    rows: NDArray[np.int64],
+    out: NDArray[np.float32],
+    sample_frame: NDArray[np.int32],
+    sample_player: NDArray[np.uint8],
+    frame_match: NDArray[np.int32],
+    ball: NDArray[np.float32],
+    position: NDArray[np.float32],
+    detail: NDArray[np.int16],
+    parameters: NDArray[np.float32],
+    types_per_match: int,
+    speed: NDArray[np.float32],
+    ball_limit: NDArray[np.float32],
+    own_field: NDArray[np.int64],
+    own_middle: NDArray[np.float32],
+    own_half: NDArray[np.float32],
+    all_field: NDArray[np.int64],
+    all_middle: NDArray[np.float32],
+    all_half: NDArray[np.float32],
+    mean: NDArray[np.float32],
+    std: NDArray[np.float32],
+) -> int:
+    """Fill ``out``, (len(rows), columns); gives how many rows come before the first that points at nothing."""
+    n_samples, n_frames = len(sample_frame), len(frame_match)
+    place = np.empty(22, np.int64)
+    value, bound = np.empty_like(mean), np.ones_like(mean)
+    bound[:4] = ball_limit
+    bound[4:26], bound[26:48], bound[48:70] = _MAX_X, _MAX_Y, _BODY_LIMIT
+    bound[114], bound[115], bound[116] = _MAX_X, _MAX_Y, _BODY_LIMIT
+    for index in range(len(rows)):
+        if index + _FAR < len(rows) and 0 <= rows[index + _FAR] < n_samples:
+            _prefetch(sample_frame, rows[index + _FAR])
+            _prefetch(sample_player, rows[index + _FAR])
+        if index + _NEAR < len(rows) and 0 <= rows[index + _NEAR] < n_samples:
+            frame = np.int64(sample_frame[rows[index + _NEAR]])
+            _prefetch(frame_match, frame)
+            _prefetch(ball, frame * 4)
+            for line in range(_POSITION_LINES):
+                _prefetch(position, frame * 44 + line * 16)
+            for line in range(_FRAME_LINES):
+                _prefetch(detail, frame * detail.shape[1] * detail.shape[2] + line * 32)
+
+        row = rows[index]
+        if row < 0 or row >= n_samples:
+            return index
+        frame, actor = np.int64(sample_frame[row]), sample_player[row]
+        if frame < 0 or frame >= n_frames or actor >= 22:
+            return index
+        first = frame_match[frame] * types_per_match
+        value[:4] = ball[frame]
+        for player in range(22):
+            channels = detail[frame, player]
+            kind = first + channels[_TYPE]
+            if kind < 0 or kind >= len(speed):
+                return index
+            place[player] = kind
+            vx, vy, body = channels[_VX], channels[_VY], channels[_BODY]
+            value[4 + player] = position[frame, player, 0]
+            value[26 + player] = position[frame, player, 1]
+            value[48 + player] = _NAN if body == MISSING else np.float32(body) * _BODY_STEP
+            value[70 + player] = _NAN if vx == MISSING else np.float32(vx) * _VELOCITY_STEP
+            value[92 + player] = _NAN if vy == MISSING else np.float32(vy) * _VELOCITY_STEP
+            bound[70 + player] = speed[kind]
+            bound[92 + player] = speed[kind]
+        for channel in range(5):
+            value[114 + channel] = value[4 + 22 * channel + actor]
+        bound[117] = speed[place[actor]]
+        bound[118] = speed[place[actor]]
+        column = 119
+        for field in range(len(own_field)):
+            value[column] = (parameters[place[actor], own_field[field]] - own_middle[field]) / own_half[field]
+            column += 1
+        for field in range(len(all_field)):
+            for player in range(22):
+                value[column] = (parameters[place[player], all_field[field]] - all_middle[field]) / all_half[field]
+                column += 1
+        for column in range(len(mean)):
+            out[index, column] = (value[column] / bound[column] - mean[column]) / std[column]
+    return len(rows)

@@ -1,0 +1,227 @@
+"""From a store to a dataset: the same bytes however it is made, memory that does not grow, and nothing half done."""
+
+from __future__ import annotations
+
+import dataclasses
+import fcntl
+import json
+import os
+import shutil
+import time
+import tracemalloc
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from disk import small_disk
+from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
+from teamclone.dataset.layout import Split
+from teamclone.dataset.reader import open_dataset
+from teamclone.errors import ClusterError, DatasetError, StoreError
+from teamclone.logs import read_match
+from teamclone.store import Store, create_store, open_store
+
+TEAM = "HELIOS_base"
+MATCHES = 5
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory, fixtures_dir: Path) -> Store:
+    """One short match under several names."""
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match = read_match(log)
+    made = create_store(tmp_path_factory.mktemp("store") / "store")
+    for number in range(MATCHES):
+        made.add(dataclasses.replace(match, match_id=f"{number:016x}"))
+    return made
+
+
+@pytest.fixture
+def config(store: Store) -> DatasetConfig:
+    (row,) = {(row["left_name"], row["right_name"]) for row in store.matches().to_pylist()}
+    return DatasetConfig(team=row[0])
+
+
+class Backwards(ThreadPoolExecutor):
+    """Ends the first task last."""
+
+    rest = 0.3
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        self.rest, rest = self.rest / 2, self.rest
+
+        def wait_first() -> Any:
+            time.sleep(rest)
+            return function(*args, **options)
+
+        return super().submit(wait_first)
+
+
+class Failing(Executor):
+    """Every task ends with this error; None drops them."""
+
+    def __init__(self, error: Exception | None) -> None:
+        self.error = error
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        if self.error is None:
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        else:
+            future.set_exception(self.error)
+        return future
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("split", SplitBy)
+def test_the_same_bytes_wherever_matches_are_cleaned(
+    store: Store, config: DatasetConfig, tmp_path: Path, split: SplitBy
+) -> None:
+    config = dataclasses.replace(config, split=split)
+    reports = [
+        build_dataset(config, store=store, out=tmp_path / "one", jobs=1),
+        build_dataset(config, store=store, out=tmp_path / "two", jobs=2),
+    ]
+    with Backwards(MATCHES) as executor:
+        reports.append(build_dataset(config, store=store, out=tmp_path / "any", executor=executor))
+    one = content(tmp_path / "one")
+    assert len(one) == 16
+    for name, report in zip(("two", "any"), reports[1:], strict=True):
+        assert content(tmp_path / name) == one
+        assert report == reports[0]
+
+
+def test_matches_lie_behind_one_another(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    report = build_dataset(config, store=store, out=tmp_path / "ds", jobs=1)
+    dataset = open_dataset(tmp_path / "ds")
+    n = len(dataset) // MATCHES
+    assert n > 1000
+    first, last = np.arange(n), np.arange(len(dataset) - n, len(dataset))
+    assert dataset.match(first).unique().tolist() == [0]
+    assert dataset.match(last).unique().tolist() == [MATCHES - 1]
+    # The same match each time: the same states and commands.
+    assert dataset.state(last).players.equal(dataset.state(first).players)
+    assert dataset.target(last).parameters.equal(dataset.target(first).parameters)
+    splits = Counter(match["split"] for match in report["matches"])
+    assert {split: sum(rows.values()) for split, rows in report["rows"].items() if any(rows.values())} == {
+        split: count * n for split, count in splits.items()
+    }
+    assert report["executed"] == len(dataset)
+    assert sum(match["idle"] for match in report["matches"]) == report["idle"]
+
+
+def test_rows_are_split_within_each_match(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    build_dataset(dataclasses.replace(config, split=SplitBy.ROWS), store=store, out=tmp_path / "ds", jobs=1)
+    dataset = open_dataset(tmp_path / "ds")
+    for match in range(MATCHES):
+        of_match = dataset.samples["split"][dataset.match(np.arange(len(dataset))) == match].numpy()
+        assert (of_match == Split.TRAIN).mean() == pytest.approx(0.95, abs=1e-3)
+        assert (of_match == Split.TEST).mean() == pytest.approx(0.025, abs=1e-3)
+
+
+def test_memory_does_not_grow_with_the_matches(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    folder = Path(store.location)
+    many = Path(shutil.copytree(folder, tmp_path / "many"))
+    for number in range(5 * MATCHES):
+        copy = many / "matches" / f"f{number:015x}"
+        shutil.copytree(folder / "matches" / store.match_ids()[0], copy)
+        row = pq.read_table(copy / "matches.parquet")
+        pq.write_table(row.set_column(0, row.schema.field(0), pa.array([copy.name])), copy / "matches.parquet")
+    peaks = []
+    # The first run fills caches; of two the smaller, since threads of earlier tests may be at work.
+    for number, made in enumerate((store, store, open_store(many), open_store(many))):
+        tracemalloc.start()
+        build_dataset(config, store=made, out=tmp_path / f"ds{number}", jobs=1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    size = sum(path.stat().st_size for path in (tmp_path / "ds1").rglob("*.npy"))
+    assert min(peaks[2:]) - peaks[1] < size / 2
+
+
+def test_a_killed_worker_is_named(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"HELIOS.*the process that cleaned it was killed"):
+        build_dataset(config, store=store, out=tmp_path / "ds", executor=Failing(BrokenExecutor()))
+    with pytest.raises(ClusterError, match="connection to the workers was lost"):
+        build_dataset(config, store=store, out=tmp_path / "ds", executor=Failing(None))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_worker_that_does_not_see_the_store(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    marker = Path(store.location) / "store.json"
+
+    class Elsewhere(Executor):
+        """A machine on which another store lies at the same place."""
+
+        def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            before = marker.stat().st_mtime_ns
+            os.utime(marker, ns=(1, 1))
+            try:
+                future.set_result(function(*args, **options))
+            except StoreError as error:
+                future.set_exception(error)
+            finally:
+                os.utime(marker, ns=(before, before))
+            return future
+
+    with pytest.raises(StoreError, match=r"the worker on .* does not see this store"):
+        build_dataset(config, store=store, out=tmp_path / "ds", executor=Elsewhere())
+    assert list(tmp_path.iterdir()) == []
+
+
+# -- nothing half done -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kilobytes", [16, 400])
+def test_a_full_disk(store: Store, config: DatasetConfig, tmp_path: Path, kilobytes: int) -> None:
+    with small_disk(tmp_path / "disk", kilobytes=kilobytes) as disk:
+        with pytest.raises(DatasetError, match="ds: the disk is full; make room") as caught:
+            build_dataset(config, store=store, out=disk / "ds", jobs=1)
+        assert "\n" not in str(caught.value)
+        assert list(disk.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_made(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(DatasetError, match="cannot be written"):
+        build_dataset(config, store=store, out=tmp_path / "file" / "ds", jobs=1)
+
+
+def test_what_is_there_stays_until_the_new_one_is_whole(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    out = tmp_path / "ds"
+    build_dataset(config, store=store, out=out, jobs=1)
+    before = content(out)
+    with pytest.raises(DatasetError, match="already exists"):
+        build_dataset(config, store=store, out=out, jobs=1)
+    with pytest.raises(DatasetError, match="was killed"):
+        build_dataset(config, store=store, out=out, replace=True, executor=Failing(BrokenExecutor()))
+    assert content(out) == before
+    build_dataset(dataclasses.replace(config, seed=7), store=store, out=out, replace=True, jobs=1)
+    assert json.loads((out / "dataset.json").read_text())["options"]["seed"] == 7
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_leftovers_of_killed_writers_go_but_not_those_at_work(
+    store: Store, config: DatasetConfig, tmp_path: Path
+) -> None:
+    dead, alive, other = (tmp_path / name for name in (".ds.12.part", ".ds.13.part", ".ds2.14.part"))
+    for folder in (dead, alive, other):
+        (folder / "frames").mkdir(parents=True)
+    handle = os.open(alive, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        build_dataset(config, store=store, out=tmp_path / "ds", jobs=1)
+    finally:
+        os.close(handle)
+    assert sorted(tmp_path.iterdir()) == [alive, other, tmp_path / "ds"]

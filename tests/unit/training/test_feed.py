@@ -1,0 +1,172 @@
+"""Batches on the quick way are those of the plain way: raw states, and the model's own features of them."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from tests.synthetic import make_dataset
+
+from teamclone.dataset.build import DatasetConfig, build_dataset
+from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING
+from teamclone.dataset.reader import Dataset, open_dataset
+from teamclone.errors import DatasetError
+from teamclone.logs import read_match
+from teamclone.models.config import ModelConfig
+from teamclone.models.features import PaperFeatures
+from teamclone.models.network import Clone
+from teamclone.store import create_store
+from teamclone.training.feed import Feed
+from teamclone.training.gather import Gather
+from teamclone.training.group import ALONE, Group
+from teamclone.training.loop import answer
+
+CPU = torch.device("cpu")
+CONFIGS = (
+    ModelConfig(),
+    ModelConfig(own_type=True),
+    ModelConfig(all_types=("stamina", "movement")),
+    ModelConfig(own_type=True, all_types=("movement", "kick", "stamina")),
+)
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory, samples_dir: Path) -> Dataset:
+    """Two real matches."""
+    folder = tmp_path_factory.mktemp("real")
+    store = create_store(folder / "store")
+    for log in sorted(samples_dir.glob("*YuShan2024*.rcg.xz")):
+        store.add(read_match(log))
+    build_dataset(DatasetConfig(team="HELIOS_base"), store=store, out=folder / "ds", jobs=1)
+    return open_dataset(folder / "ds")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return open_dataset(make_dataset(tmp_path_factory.mktemp("data") / "ds", frames_per_match=30))
+
+
+def fitted(dataset: Dataset, config: ModelConfig) -> Clone:
+    torch.manual_seed(0)
+    model = Clone(config)
+    model.inputs.fit([model.inputs.project(dataset.state(np.arange(len(dataset))))])
+    return model
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+def test_gathered_inputs_of_real_matches_are_the_features_bit_for_bit(real: Dataset, config: ModelConfig) -> None:
+    model = fitted(real, config)
+    rows = np.random.default_rng(0).permutation(len(real))
+    assert len(rows) > 20_000
+    assert torch.equal(Gather(real, model.features)(rows), model.features(real.state(rows)))
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+def test_what_a_log_lacks_is_not_a_number_in_the_same_places(
+    made: Dataset, tmp_path: Path, config: ModelConfig
+) -> None:
+    rng = np.random.default_rng(0)
+    detail, ball = (made.frames[name].numpy().copy() for name in ("detail", "ball"))
+    kind = [channel.name for channel in DETAIL_CHANNELS].index("type")
+    detail[(rng.random(detail.shape) < 0.1) & (np.arange(detail.shape[2]) != kind)] = MISSING
+    ball[rng.random(ball.shape) < 0.1] = np.nan
+    lacking = open_dataset(
+        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/detail": detail, "frames/ball": ball})
+    )
+    model = fitted(made, config)
+    rows = np.arange(len(lacking))
+    inputs = Gather(lacking, model.features)(rows)
+    assert 0.02 < float(inputs.isnan().float().mean()) < 0.2
+    assert torch.equal(inputs.nan_to_num(9), model.features(lacking.state(rows)).nan_to_num(9))
+
+
+@pytest.mark.parametrize(
+    ("array", "value", "row"),
+    [("samples/frame", 120, 7), ("samples/frame", -1, 7), ("samples/player", 22, 7), ("frames/match", 4, 0)],
+)
+def test_an_index_that_points_at_nothing_is_told(
+    made: Dataset, tmp_path: Path, array: str, value: int, row: int
+) -> None:
+    """The writer refuses such arrays; a damaged disk does not."""
+    shutil.copytree(made.path, tmp_path / "ds")
+    values = np.load(tmp_path / "ds" / f"{array}.npy")
+    values[row] = value
+    np.save(tmp_path / "ds" / f"{array}.npy", values)
+    damaged = open_dataset(tmp_path / "ds")
+    with pytest.raises(DatasetError, match=r"sample \d points at nothing; make the dataset again"):
+        Gather(damaged, Clone(ModelConfig()).features)(np.arange(20))
+
+
+def test_rows_beyond_the_dataset_are_told(made: Dataset) -> None:
+    gather = Gather(made, Clone(ModelConfig()).features)
+    for row in (-1, len(made)):
+        with pytest.raises(DatasetError, match=f"sample {row} points at nothing"):
+            gather(np.array([0, row]))
+    assert gather(np.empty(0, np.int64)).shape == (0, 119)
+
+
+class OtherFeatures(PaperFeatures):
+    """Inputs that `Gather` does not know."""
+
+    def forward(self, state: object) -> torch.Tensor:
+        return super().forward(state) * 2  # type: ignore[arg-type]
+
+
+def as_on_a_card(feed: Feed) -> None:
+    feed.on_card, feed.gather = True, None
+
+
+def with_other_features(feed: Feed) -> None:
+    feed.gather = None
+
+
+@pytest.mark.parametrize("way", [lambda feed: None, as_on_a_card, with_other_features])
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_shares_make_up_the_batches_in_order(made: Dataset, way: Callable[[Feed], None], size: int) -> None:
+    model = fitted(made, CONFIGS[0])
+    rows = np.random.default_rng(0).permutation(len(made))[:101]
+    feeds = [Feed(made, model, CPU, Group(rank=rank, size=size)) for rank in range(size)]
+    for feed in feeds:
+        way(feed)
+    ready = [list(feed.batches(rows, 25)) for feed in feeds]
+    assert {len(batches) for batches in ready} == {5}
+    for number, shares in enumerate(zip(*ready, strict=True)):
+        part = rows[25 * number : 25 * number + 25]
+        for rank, share in enumerate(shares):
+            assert torch.equal(share.inputs, model.features(made.state(part[rank::size])))
+            assert torch.equal(share.target.kind, made.target(part[rank::size]).kind)
+            assert torch.equal(share.target.parameters, made.target(part[rank::size]).parameters)
+            assert torch.equal(share.whole, made.target(part).kind)
+            assert not share.inputs.requires_grad
+
+
+def test_other_features_are_asked_themselves(made: Dataset) -> None:
+    model = fitted(made, CONFIGS[0])
+    rows = np.arange(9)
+    plain = model.features(made.state(rows))
+    model.features = OtherFeatures()
+    model.features.load_state_dict(fitted(made, CONFIGS[0]).features.state_dict())
+    (batch,) = Feed(made, model, CPU, ALONE).batches(rows, 9)
+    assert torch.equal(batch.inputs, 2 * plain)
+
+
+@pytest.mark.parametrize("activation", ["relu", "gelu", "silu", "tanh"])
+@pytest.mark.parametrize("n", [1, 257])
+def test_a_step_on_the_quick_way_is_a_plain_step_but_for_rounding(real: Dataset, activation: str, n: int) -> None:
+    model = fitted(real, replace(CONFIGS[0], activation=activation, hidden=(64, 32)))
+    rows = np.random.default_rng(1).permutation(len(real))[:n]
+    gradients = []
+    for plain in (True, False):
+        (batch,) = Feed(real, model, CPU, ALONE).batches(rows, n)
+        output = model.output(real.state(rows)) if plain else answer(model, batch.inputs, precision="fp32")
+        loss = model.head.loss(output, real.target(rows) if plain else batch.target)
+        model.zero_grad()
+        loss.total.backward()
+        gradients.append([loss.total.detach(), *(weights.grad.clone() for weights in model.parameters())])
+    for one, other in zip(*gradients, strict=True):
+        assert torch.allclose(one, other, rtol=1e-4, atol=1e-6)

@@ -22,8 +22,8 @@ from teamclone.evaluation import baselines as rules
 from teamclone.evaluation import bootstrap, metrics
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
+from teamclone.files import write_atomic
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
-from teamclone.training.checkpoint import write_atomic
 
 if TYPE_CHECKING:
     from teamclone.models.network import Clone

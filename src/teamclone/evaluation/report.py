@@ -16,8 +16,8 @@ from teamclone.errors import RunError
 from teamclone.evaluation import bootstrap, figures, paper
 from teamclone.evaluation.evaluate import evaluate, load_evaluation, model_id, save_evaluation, write_json
 from teamclone.evaluation.latency import load_bench, measure_latency
+from teamclone.files import write_atomic
 from teamclone.rcss.commands import CLONED_KINDS
-from teamclone.training.checkpoint import write_atomic
 from teamclone.training.config import to_toml
 from teamclone.training.run import Run
 

@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 
 from teamclone import __version__
 from teamclone.errors import StoreError, UsageError
+from teamclone.files import write_atomic
 from teamclone.logs.columns import COUNTERS, counter_name
 from teamclone.logs.match import Columns, Match
 from teamclone.store import convert, schema
@@ -95,7 +96,7 @@ class ParquetStore:
             store = cls(root)
             for folder in (store._matches, store._files, store._unfinished):
                 folder.mkdir(exist_ok=True)
-            _replace(store.root / MARKER, _json(marker))
+            write_atomic(store.root / MARKER, _json(marker))
         return store
 
     # -- reading ---------------------------------------------------------------------------------------------------
@@ -218,7 +219,7 @@ class ParquetStore:
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
         with _writing(self.root):
             for status in statuses:
-                _replace(self._files / f"{status.key}.json", _json(status.to_json()))
+                write_atomic(self._files / f"{status.key}.json", _json(status.to_json()))
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -330,20 +331,6 @@ def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Source
 
 def _json(value: Any) -> bytes:
     return (json.dumps(value, indent=1) + "\n").encode()
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Write a file in one step: readers see the old content or the new."""
-    fresh = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        with fresh.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
-    except BaseException:
-        fresh.unlink(missing_ok=True)
-        raise
 
 
 def _sync(path: Path) -> None:

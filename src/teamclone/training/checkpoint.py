@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +11,7 @@ from safetensors import SafetensorError, safe_open
 from torch import nn
 
 from teamclone.errors import RunError
-
-
-def write_atomic(path: Path, data: bytes) -> None:
-    """Write a file so that a reader, also after a crash, sees the old one or the new one."""
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+from teamclone.files import write_atomic
 
 
 def save_weights(path: Path, model: nn.Module, *, epoch: int) -> None:

@@ -20,10 +20,11 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.order import epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.files import write_atomic
 from teamclone.models.loss import ParameterLoss
 from teamclone.models.network import Clone
 from teamclone.models.state import CHANNEL, State
-from teamclone.training.checkpoint import load_progress, save_progress, save_weights, write_atomic
+from teamclone.training.checkpoint import load_progress, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
 from teamclone.training.feed import Feed
 from teamclone.training.group import joined, local_rank

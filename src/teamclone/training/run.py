@@ -30,9 +30,10 @@ import torch
 from teamclone import __version__
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError, UsageError
+from teamclone.files import write_atomic
 from teamclone.models.network import Clone
 from teamclone.rcss.commands import CLONED_KINDS
-from teamclone.training.checkpoint import load_weights, write_atomic
+from teamclone.training.checkpoint import load_weights
 from teamclone.training.config import Config, config_from, to_toml
 
 FORMAT = 1

@@ -158,7 +158,7 @@ def test_a_full_disk_at_any_write_costs_an_epoch_at_most(
             raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("teamclone.training.checkpoint.os.fsync", fsync)
+        patch.setattr("teamclone.files.os.fsync", fsync)
         with pytest.raises(OSError, match="No space left"):
             train(tiny("train.epochs=2"), dataset, tmp_path / "run")
     # Two writes make the folder; where it was not made, training begins anew.

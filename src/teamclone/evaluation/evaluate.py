@@ -495,19 +495,23 @@ def _layout(value: Any, indent: str = "") -> str:
 
 
 def load_evaluation(path: Path | str) -> dict[str, Any]:
-    """Read an evaluation back.
+    """Read an evaluation back; raises as `read_document`."""
+    return read_document(Path(path), number=FORMAT, what="an evaluation", command="teamclone evaluate")
+
+
+def read_document(path: Path, *, number: int, what: str, command: str) -> dict[str, Any]:
+    """Read back what `write_json` wrote; ``what`` it is and which ``command`` makes it go into the errors.
 
     Raises:
         RunError: missing, damaged or of another format number.
     """
-    path = Path(path)
     try:
-        evaluation: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        found = evaluation["format"]
+        document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        found = document["format"]
     except FileNotFoundError:
-        raise RunError(f"{path}: missing; make it with `teamclone evaluate`") from None
+        raise RunError(f"{path}: missing; make it with `{command}`") from None
     except (ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path}: not an evaluation ({error!r}); make it again with `teamclone evaluate`") from None
-    if found != FORMAT:
-        raise RunError(f"{path}: format {found}, this version reads {FORMAT}; run `teamclone evaluate` again")
-    return evaluation
+        raise RunError(f"{path}: not {what} ({error!r}); make it again with `{command}`") from None
+    if found != number:
+        raise RunError(f"{path}: format {found}, this version reads {number}; run `{command}` again")
+    return document

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import json
 import platform
 import time
 from collections.abc import Callable
@@ -15,8 +14,8 @@ import torch
 
 import teamclone
 from teamclone.dataset.reader import Dataset
-from teamclone.errors import DatasetError, RunError
-from teamclone.evaluation.evaluate import model_id
+from teamclone.errors import DatasetError
+from teamclone.evaluation.evaluate import model_id, read_document
 from teamclone.models.state import State
 
 if TYPE_CHECKING:
@@ -124,19 +123,5 @@ def _processor() -> str:
 
 
 def load_bench(path: Path | str) -> dict[str, Any]:
-    """Read bench.json back.
-
-    Raises:
-        RunError: missing, damaged or of another format number.
-    """
-    path = Path(path)
-    try:
-        bench: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        found = bench["format"]
-    except FileNotFoundError:
-        raise RunError(f"{path}: missing; make it with `teamclone bench`") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path}: not a benchmark ({error!r}); make it again with `teamclone bench`") from None
-    if found != FORMAT:
-        raise RunError(f"{path}: format {found}, this version reads {FORMAT}; run `teamclone bench` again")
-    return bench
+    """Read bench.json back; raises as `read_document`."""
+    return read_document(Path(path), number=FORMAT, what="a benchmark", command="teamclone bench")

@@ -31,7 +31,8 @@ def train(
     dataset: Annotated[Path, typer.Argument(help="Dataset made by `teamclone dataset`.")],
     out: Annotated[Path, typer.Option("--out", help="Run folder to make, or to go on with.")],
     preset: Annotated[
-        str | None, typer.Option(help="Settings to start from: paper or small; default small.", show_default=False)
+        str | None,
+        typer.Option(help="Settings to start from: best, paper or small; default small.", show_default=False),
     ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change one setting: train.epochs=50.")
@@ -89,6 +90,9 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Progress], None]:
         nonlocal text
         if at.record is not None:
             text = _line(at)
+        if not at.epoch:
+            update(task, total=at.batches, completed=at.batch, description="making the inputs")
+            return
         update(
             task,
             total=at.epochs * at.batches,
@@ -105,6 +109,8 @@ def _lines() -> Callable[[Progress], None]:
 
     def report(at: Progress) -> None:
         nonlocal told
+        if not at.epoch:
+            return
         now, tenths = time.monotonic(), 10 * at.epoch // at.epochs - 10 * (at.epoch - 1) // at.epochs
         if at.record is not None and (tenths or now - told > 60):
             told = now

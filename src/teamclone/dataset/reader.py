@@ -93,24 +93,44 @@ class Dataset:
         """The samples of a split, ascending."""
         return np.flatnonzero(self.samples["split"].numpy() == int(split))
 
-    def state(self, rows: Rows) -> State:
-        """The situations in which the commands of these samples were decided, in the order asked for."""
+    def state(self, rows: Rows, *, history: int = 0) -> State:
+        """The situations in which the commands of these samples were decided, in the order asked for.
+
+        Args:
+            history: how many frames before each to give too.
+        """
         rows = torch.as_tensor(rows)
-        frame = self.samples["frame"].index_select(0, rows)
-        detail = self.frames["detail"].index_select(0, frame)
-        players = torch.empty(len(rows), 22, len(PLAYER_CHANNELS), device=rows.device)
-        players[..., :2] = self.frames["position"].index_select(0, frame)
-        torch.mul(detail, _steps(rows.device), out=players[..., 2:])
-        players[..., 2:].masked_fill_(detail == MISSING, math.nan)
+        frame = self.samples["frame"].index_select(0, rows).long()
+        players = self._players(frame)
         n_types = self.player_types.shape[1]
-        place = self.frames["match"].index_select(0, frame)[:, None] * n_types + detail[..., _DETAIL["type"]]
+        kinds = players[..., len(PLAYER_CHANNELS) - len(DETAIL_CHANNELS) + _DETAIL["type"]].long()
+        place = self.frames["match"].index_select(0, frame)[:, None] * n_types + kinds
         types = self.player_types.reshape(-1, len(FIELDS)).index_select(0, place.reshape(-1))
+        back = torch.arange(1, history + 1, device=rows.device)
+        past = (frame[:, None] - back).clamp(min=0)
+        known = torch.ones_like(past, dtype=torch.bool)
+        for name, step in (("match", 0), ("cycle", 1)):
+            value = self.frames[name]
+            known &= value[past] == value[frame][:, None] - step * back
+        past = torch.where(known, past, frame[:, None]).reshape(-1)
         return State(
             ball=self.frames["ball"].index_select(0, frame),
             players=players,
             types=types.reshape(len(rows), 22, len(FIELDS)),
             actor=self.samples["player"].index_select(0, rows).long(),
+            past_ball=self.frames["ball"].index_select(0, past).reshape(len(rows), history, 4),
+            past_players=self._players(past).reshape(len(rows), history, 22, len(PLAYER_CHANNELS)),
+            past_known=known,
         )
+
+    def _players(self, frame: Tensor) -> Tensor:
+        """(frames, 22, len(PLAYER_CHANNELS)) of some frames."""
+        detail = self.frames["detail"].index_select(0, frame)
+        players = torch.empty(len(frame), 22, len(PLAYER_CHANNELS), device=frame.device)
+        players[..., :2] = self.frames["position"].index_select(0, frame)
+        torch.mul(detail, _steps(frame.device), out=players[..., 2:])
+        players[..., 2:].masked_fill_(detail == MISSING, math.nan)
+        return players
 
     def target(self, rows: Rows) -> Target:
         """What the players did."""

@@ -72,7 +72,7 @@ def predict(
         for start in range(0, n, batch):
             part = rows[start : start + batch]
             stop = start + len(part)
-            state = dataset.state(part)
+            state = dataset.state(part, history=model.inputs.history)
             answer = model(state.to(device))
             kind, issued, last = truth(dataset, part)
             outcome.probabilities[start:stop] = answer.logits.float().softmax(1).cpu().numpy()

@@ -150,7 +150,7 @@ def turn_moments(edges: Sequence[float], counts: Sequence[int], *, zero: int, tu
 CURVES = (
     ("cross-entropy, nats", "train_cross_entropy", "validation_cross_entropy"),
     ("accuracy", "train_accuracy", "validation_accuracy"),
-    ("mean squared error of the parameters", "train_parameter_mse", "validation_parameter_mse"),
+    ("error of the parameters, as trained on", "train_parameter_loss", "validation_parameter_loss"),
     ("mean absolute error, as the paper's", "train_parameter_mae", "validation_parameter_mae"),
 )
 

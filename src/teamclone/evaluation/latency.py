@@ -50,7 +50,7 @@ def measure_latency(
     if not len(dataset):
         raise DatasetError(f"{dataset.path}: no samples to predict; build the dataset from more matches")
     rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + TEAM)
-    states = dataset.state(rows)
+    states = dataset.state(rows, history=model.inputs.history)
     singles = [_slice(states, start, 1) for start in range(N_STATES)]
     teams = [_slice(states, start, TEAM) for start in range(N_STATES)]
     model = model.cpu().eval()

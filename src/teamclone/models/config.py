@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-FEATURE_SETS = ("paper",)
-"""Sets of inputs; the modules are `features.FEATURES`."""
+FEATURE_SETS = ("paper", "relative")
+"""Sets of inputs; the modules are `features.PaperFeatures` and `relative.RelativeFeatures`."""
+BLOCKS = ("self", "role", "type", "last", "view", "ball", "reach", "lines", "mates", "opponents", "rivals", "past")
+"""Blocks of the relative inputs, in the order of their columns; see `relative.RelativeFeatures`."""
+HEADS = ("point", "mixture")
+"""Forms of the answer: the paper's point, or a distribution of every parameter."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
 """Hidden activations."""
 
@@ -16,14 +20,28 @@ class ModelConfig:
 
     Attributes:
         features: name of the set of inputs, see `FEATURE_SETS`.
-        own_type: add the acting player's type (127 inputs instead of 119).
-        all_types: groups of type parameters to add for all 22 players: movement, kick, stamina.
+        own_type: add the acting player's type (127 inputs instead of 119). Only of the paper's inputs.
+        all_types: groups of type parameters to add for all 22 players: movement, kick, stamina. Only of the paper's.
+        blocks: blocks that decide on the command, see `BLOCKS`. Only of the relative inputs, as all that follows.
+        kick_blocks: blocks that decide where a kick goes.
+        aims: places on the pitch that the network supposes a player to make for; see `aims.Aims`.
+        aim_hidden: widths of the layers that find them.
+        kick_hidden: widths of the layers that decide where a kick goes.
         hidden: widths of the hidden layers.
         activation: see `ACTIVATIONS`.
+        dropout: share of the hidden units left out at random in training.
+        head: see `HEADS`; mixture needs the relative inputs.
     """
 
     features: str = "paper"
     own_type: bool = False
     all_types: tuple[str, ...] = ()
+    blocks: tuple[str, ...] = ()
+    kick_blocks: tuple[str, ...] = ()
+    aims: int = 0
+    aim_hidden: tuple[int, ...] = ()
+    kick_hidden: tuple[int, ...] = ()
     hidden: tuple[int, ...] = (512, 256, 128)
     activation: str = "relu"
+    dropout: float = 0.0
+    head: str = "point"

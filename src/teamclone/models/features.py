@@ -24,14 +24,17 @@ PLAYERS = (*(f"team_{number}" for number in range(1, 12)), *(f"opponent_{number}
 
 
 class Features(Protocol):
-    """What a network asks of its inputs. A new set of inputs is one such module and its line in `FEATURES`."""
+    """What a network asks of its inputs. A new set of inputs is one such module and its place in `network.Clone`."""
 
     names: tuple[str, ...]
     channels: tuple[str, ...]
     """The channels of ``State.players`` that it reads: a log that lacks one of them cannot be used."""
+    history: int
+    """Frames before the present that it reads."""
 
     def fit(self, chunks: Iterable[Tensor]) -> None: ...
     def project(self, state: State) -> Tensor: ...
+    def normalise(self, columns: Tensor) -> Tensor: ...
     def __call__(self, state: State) -> Tensor: ...
 
 
@@ -77,6 +80,7 @@ class PaperFeatures(nn.Module):
     """
 
     channels = ("x", "y", "vx", "vy", "body")
+    history = 0
     ball_limit: Tensor
 
     def __init__(self, *, own_type: bool = False, all_types: tuple[str, ...] = ()) -> None:
@@ -126,9 +130,13 @@ class PaperFeatures(nn.Module):
         """Fit the normalisation on what `project` makes of the training samples, chunk by chunk."""
         self.normalisation.fit(chunks)
 
-    def forward(self, state: State) -> Tensor:
-        normalised: Tensor = self.normalisation(self.project(state))
+    def normalise(self, columns: Tensor) -> Tensor:
+        """(batch, len(names)) of what `project` gives."""
+        normalised: Tensor = self.normalisation(columns)
         return normalised
+
+    def forward(self, state: State) -> Tensor:
+        return self.normalise(self.project(state))
 
 
 class TypeParameters(nn.Module):
@@ -150,7 +158,3 @@ class TypeParameters(nn.Module):
         """``types``: (batch, players, fields)."""
         values = types.index_select(2, self.places).transpose(1, 2)
         return (values - self.middle) / self.half_range
-
-
-FEATURES = {"paper": PaperFeatures}
-"""The modules of `config.FEATURE_SETS`."""

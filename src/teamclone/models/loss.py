@@ -1,4 +1,4 @@
-"""The paper's training error, and the targets in the form that it compares."""
+"""Training errors, and the targets in the form that the paper's compares."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _KIND = torch.tensor([CLONED_KINDS.index(parameter.kind) for parameter in PARAME
 
 
 class Loss(NamedTuple):
-    """The training error and its two parts, scalars: ``total = cross_entropy + parameter_mse``."""
+    """The training error and its two parts, scalars: ``total = cross_entropy + parameters``."""
 
     total: Tensor
     cross_entropy: Tensor
-    parameter_mse: Tensor
+    parameters: Tensor
 
 
 @cache
@@ -46,7 +46,7 @@ def projected_parameters(target: Target) -> Tensor:
     return torch.where(issued(target.kind), values, 0.0)
 
 
-def clone_loss(
+def point_loss(
     logits: Tensor,
     projected: Tensor,
     target: Target,
@@ -73,3 +73,15 @@ def clone_loss(
     else:
         mse = squared.sum() / (len(whole) * len(PARAMETERS))
     return Loss(cross_entropy + mse, cross_entropy, mse)
+
+
+def mixture_loss(logits: Tensor, log_likelihood: Tensor, target: Target, *, whole: Tensor | None = None) -> Loss:
+    """Mean negative log-likelihood of the command and, given the command, of its parameters.
+
+    Args:
+        logits: (batch, 4). log_likelihood: (batch,) of the parameters. target, whole: as of `point_loss`.
+    """
+    n = len(target.kind if whole is None else whole)
+    cross_entropy = functional.cross_entropy(logits, target.kind, reduction="sum") / n
+    parameters = -log_likelihood.sum() / n
+    return Loss(cross_entropy + parameters, cross_entropy, parameters)

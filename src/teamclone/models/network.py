@@ -2,75 +2,71 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import NamedTuple, cast
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
 
+from teamclone.models.aims import COLUMNS, Aims, layers
 from teamclone.models.config import ModelConfig
-from teamclone.models.features import FEATURES, Features
-from teamclone.models.loss import LIMITS, Loss, ParameterLoss, clone_loss
-from teamclone.models.state import State, Target
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+from teamclone.models.features import Features, PaperFeatures
+from teamclone.models.heads import MixtureHead, PointHead, Prediction, Situation
+from teamclone.models.relative import RelativeFeatures
+from teamclone.models.state import State
 
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"relu": nn.ReLU, "gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
 
 
-class Prediction(NamedTuple):
-    """One answer per situation: ``logits`` (batch, 4) over CLONED_KINDS, ``parameters`` (batch, 6) PARAMETERS in
-    power and degrees, each as it would be if its command were given."""
+class AimedTrunk(nn.Module):
+    """Hidden layers over relative inputs: where the player makes for, then what he does, and apart from it a kick."""
 
-    logits: Tensor
-    parameters: Tensor
+    command_columns: Tensor
+    kick_columns: Tensor
+    aim_columns: Tensor
 
-
-class PointHead(nn.Module):
-    """The paper's two heads: a softmax over four commands, six parameters bounded by tanh."""
-
-    limits: Tensor
-
-    def __init__(self, width: int) -> None:
+    def __init__(self, config: ModelConfig, features: RelativeFeatures) -> None:
         super().__init__()
-        self.command = nn.Linear(width, len(CLONED_KINDS))
-        self.parameter = nn.Linear(width, len(PARAMETERS))
-        self.register_buffer("limits", LIMITS.clone(), persistent=False)
+        activation = _ACTIVATIONS[config.activation]
+        self.n_inputs = features.n_inputs
+        for name, blocks in (
+            ("command_columns", config.blocks),
+            ("kick_columns", config.kick_blocks),
+            ("aim_columns", ("role",) if "role" in config.blocks else ()),
+        ):
+            self.register_buffer(name, torch.tensor(features.columns(blocks)), persistent=False)
+        self.aims = Aims(len(self.aim_columns), config.aims, config.aim_hidden, activation)
+        seen = COLUMNS * config.aims
+        self.command = layers((len(self.command_columns) + seen, *config.hidden), activation, config.dropout)
+        self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.dropout)
 
-    def forward(self, hidden: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (batch, 4) and parameters in [-1, 1], (batch, 6)."""
-        # Out of autocast's bfloat16: a degree is 1/180, finer than its steps near 1.
-        return self.command(hidden).float(), torch.tanh(self.parameter(hidden).float())
-
-    def point(self, output: tuple[Tensor, Tensor]) -> Prediction:
-        """The single best answer, in power and degrees."""
-        logits, projected = output
-        return Prediction(logits, projected * self.limits)
-
-    def loss(
-        self,
-        output: tuple[Tensor, Tensor],
-        target: Target,
-        *,
-        parameter_loss: ParameterLoss = "paper",
-        whole: Tensor | None = None,
-    ) -> Loss:
-        logits, projected = output
-        return clone_loss(logits, projected, target, parameter_loss=parameter_loss, whole=whole)
+    def forward(self, inputs: Tensor) -> Situation:
+        columns, geometry = inputs[:, : self.n_inputs], inputs[:, self.n_inputs :]
+        seen, bearing, power = self.aims(columns.index_select(1, self.aim_columns), geometry)
+        hidden = self.command(torch.cat([columns.index_select(1, self.command_columns), seen], 1))
+        return Situation(hidden, self.kick(columns.index_select(1, self.kick_columns)), geometry, bearing, power)
 
 
 class Clone(nn.Module):
     """A network that plays like a team: which command a player gives in a situation, and with which parameters."""
 
+    features: PaperFeatures | RelativeFeatures
+    trunk: nn.Sequential | AimedTrunk
+    head: PointHead | MixtureHead
+
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
-        self.features = FEATURES[config.features](own_type=config.own_type, all_types=config.all_types)
-        widths = (len(self.features.names), *config.hidden)
-        layers: list[nn.Module] = []
-        for width_in, width_out in pairwise(widths):
-            layers += [nn.Linear(width_in, width_out), _ACTIVATIONS[config.activation]()]
-        self.trunk = nn.Sequential(*layers)
-        self.head = PointHead(widths[-1])
+        if config.features == "paper":
+            self.features = PaperFeatures(own_type=config.own_type, all_types=config.all_types)
+            widths = (len(self.features.names), *config.hidden)
+            self.trunk = layers(widths, _ACTIVATIONS[config.activation], config.dropout)
+        else:
+            self.features = RelativeFeatures(tuple({*config.blocks, *config.kick_blocks}))
+            self.trunk = AimedTrunk(config, self.features)
+        if config.head == "mixture":
+            self.head = MixtureHead(config.hidden[-1], config.kick_hidden[-1], config.aims)
+        else:
+            self.head = PointHead(config.hidden[-1])
         for module in self.modules():
             if isinstance(module, nn.Linear):
                 # Keras' default, with which the paper trained.
@@ -81,14 +77,16 @@ class Clone(nn.Module):
     def inputs(self) -> Features:
         return cast(Features, self.features)
 
-    def output(self, state: State) -> tuple[Tensor, Tensor]:
+    def output(self, state: State) -> Any:
         """What the head answers, for ``head.loss`` and ``head.point``."""
         return self.answer(self.features(state))
 
-    def answer(self, inputs: Tensor) -> tuple[Tensor, Tensor]:
+    def answer(self, inputs: Tensor) -> Any:
         """The same from what the features make of a state, (batch, columns)."""
-        answer: tuple[Tensor, Tensor] = self.head(self.trunk(inputs))
-        return answer
+        seen = self.trunk(inputs)
+        if isinstance(seen, Situation) and isinstance(self.head, PointHead):
+            seen = seen.hidden
+        return self.head(seen)
 
     def forward(self, state: State) -> Prediction:
         return self.head.point(self.output(state))

@@ -19,12 +19,32 @@ class State(NamedTuple):
         players: (batch, 22, len(PLAYER_CHANNELS)); NaN where the log lacks a value.
         types: (batch, 22, len(player_types.FIELDS)), each player's physical parameters.
         actor: (batch,) int64, place 0..10 of the player who acts.
+        past_ball, past_players: (batch, frames, 4) and (batch, frames, 22, channels), the same one, two, ... cycles
+            before; as many frames as the model asks for, none for most.
+        past_known: (batch, frames) bool; False where play had not yet begun, there the past repeats the present.
     """
 
     ball: Tensor
     players: Tensor
     types: Tensor
     actor: Tensor
+    past_ball: Tensor
+    past_players: Tensor
+    past_known: Tensor
+
+    @classmethod
+    def now(cls, *, ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> State:
+        """Situations of which no past is asked."""
+        n, n_players, n_channels = players.shape
+        return cls(
+            ball=ball,
+            players=players,
+            types=types,
+            actor=actor,
+            past_ball=ball.new_empty(n, 0, 4),
+            past_players=players.new_empty(n, 0, n_players, n_channels),
+            past_known=torch.empty(n, 0, dtype=torch.bool, device=ball.device),
+        )
 
     def to(self, device: torch.device) -> State:
         return State(*(tensor.to(device, non_blocking=True) for tensor in self))

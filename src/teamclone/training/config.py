@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from teamclone.errors import UsageError
-from teamclone.models.config import ACTIVATIONS, FEATURE_SETS, ModelConfig
+from teamclone.models.config import ACTIVATIONS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
 from teamclone.rcss.player_types import GROUPS
 
 
@@ -23,11 +23,14 @@ class DataConfig:
         batch_size: samples in a batch.
         batches_per_epoch: longest slice of the training samples that an epoch takes, in batches.
         validation_batches: validation samples that are looked at after each epoch, in batches; 0 takes all.
+        keep_gb: memory for inputs that cost more to make than a training step, the relative ones, so that they are made
+            once; where they do not fit they are made anew for each batch.
     """
 
     batch_size: int = 4096
     batches_per_epoch: int = 300
     validation_batches: int = 200
+    keep_gb: float = 8.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +40,9 @@ class TrainConfig:
     Attributes:
         epochs: slices of the training samples to go through.
         optimiser: adam, rmsprop or adagrad.
-        learning_rate: constant.
+        learning_rate: the highest.
+        schedule: constant; or cosine, which rises over the first WARM_UP batches and falls to zero over all epochs.
+        weight_decay: decoupled from the gradient (AdamW); adam only.
         betas: Adam's two decay rates; no other optimiser has them.
         epsilon: added to the optimiser's denominator.
         parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
@@ -51,6 +56,8 @@ class TrainConfig:
     epochs: int = 400
     optimiser: str = "adam"
     learning_rate: float = 0.001
+    schedule: str = "constant"
+    weight_decay: float = 0.0
     betas: tuple[float, ...] = (0.9, 0.999)
     epsilon: float = 1e-7
     parameter_loss: str = "paper"
@@ -77,6 +84,10 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "model.features": FEATURE_SETS,
     "model.activation": ACTIVATIONS,
     "model.all_types": tuple(GROUPS),
+    "model.blocks": BLOCKS,
+    "model.kick_blocks": BLOCKS,
+    "model.head": HEADS,
+    "train.schedule": ("constant", "cosine"),
     "train.optimiser": ("adam", "rmsprop", "adagrad"),
     "train.parameter_loss": ("paper", "masked"),
     "train.precision": ("auto", "fp32", "bf16"),
@@ -87,13 +98,24 @@ _AT_LEAST: dict[str, float] = {
     "data.batch_size": 1,
     "data.batches_per_epoch": 1,
     "data.validation_batches": 0,
+    "model.aims": 0,
+    "model.aim_hidden": 1,
+    "model.kick_hidden": 1,
+    "model.dropout": 0,
+    "data.keep_gb": 0,
+    "train.weight_decay": 0,
     "train.epochs": 1,
     "train.threads": 0,
     "train.seed": 0,
     "train.max_minutes": 0,
 }
 _ABOVE_ZERO = ("train.learning_rate", "train.epsilon")
-_AT_MOST: dict[str, float] = {"train.learning_rate": 1000, "train.epsilon": 1000, "train.seed": 2**63 - 1}
+_AT_MOST: dict[str, float] = {
+    "model.dropout": 0.9,
+    "train.learning_rate": 1000,
+    "train.epsilon": 1000,
+    "train.seed": 2**63 - 1,
+}
 """Beyond these PyTorch itself overflows."""
 
 
@@ -164,11 +186,45 @@ def config_from(table: dict[str, Any], *, where: str, errors: Iterable[str] = ()
         sections[section] = cls(**kept)
     problems += [f"no section {name!r}; there are {', '.join(sections)}" for name in table if name not in sections]
     config = Config(**sections)
-    if not problems and config.train.optimiser != "adam" and config.train.betas != TrainConfig().betas:
-        problems.append(f"train.betas has no effect with train.optimiser = {config.train.optimiser}; leave it out")
+    problems = problems or _idle(config)
     if problems:
         raise UsageError(f"{where}: {'; '.join(problems)}")
     return config
+
+
+def _idle(config: Config) -> list[str]:
+    """Settings that would have no effect beside the others, and those that others need."""
+    model, train = config.model, config.train
+    of_relative = ("blocks", "kick_blocks", "aims", "aim_hidden", "kick_hidden")
+    tables = (("model", model, ModelConfig()), ("train", train, TrainConfig()))
+    changed = {
+        f"{section}.{item.name}"
+        for section, of, usual in tables
+        for item in fields(of)
+        if getattr(of, item.name) != getattr(usual, item.name)
+    }
+    problems: list[str] = []
+
+    def idle(names: Iterable[str], beside: str) -> None:
+        problems.extend(f"{name} has no effect with {beside}; leave it out" for name in names if name in changed)
+
+    if train.optimiser != "adam":
+        idle(("train.betas", "train.weight_decay"), f"train.optimiser = {train.optimiser}")
+    if model.features == "paper":
+        idle((f"model.{name}" for name in of_relative), "model.features = paper")
+        if model.head == "mixture":
+            problems.append("model.head = mixture needs model.features = relative")
+    else:
+        idle(("model.own_type", "model.all_types"), "model.features = relative")
+        if bool(model.aims) != bool(model.aim_hidden):
+            problems.append("model.aims and model.aim_hidden need each other")
+        if model.head == "point":
+            idle(("model.kick_blocks", "model.kick_hidden"), "model.head = point")
+        elif not model.kick_hidden:
+            problems.append("model.head = mixture needs model.kick_hidden")
+    if model.head == "mixture":
+        idle(("train.parameter_loss",), "model.head = mixture")
+    return problems
 
 
 def to_table(config: Config) -> dict[str, dict[str, Any]]:

@@ -20,7 +20,7 @@ T = TypeVar("T")
 class Group:
     """This process among those that train together; by default it is alone.
 
-    Losses of shares add up to the loss of the batch, see `loss.clone_loss`, and so do their gradients. Hence sums, not
+    Losses of shares add up to the loss of the batch, see `loss.point_loss`, and so do their gradients. Hence sums, not
     the means of DistributedDataParallel, which are right only for shares of equal length.
 
     Attributes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -14,16 +14,15 @@ from typing import Any, Literal, NamedTuple, cast
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
-from teamclone.dataset.layout import Split
+from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
 from teamclone.dataset.order import epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.files import write_atomic
 from teamclone.models.loss import ParameterLoss
 from teamclone.models.network import Clone
-from teamclone.models.state import CHANNEL, State
 from teamclone.training.checkpoint import load_progress, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
 from teamclone.training.feed import Feed
@@ -31,8 +30,11 @@ from teamclone.training.group import joined, local_rank
 from teamclone.training.run import BEST, RESUME, Run, create_run, locked, open_run, save_config
 from teamclone.training.scores import Scores
 
+DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
 FIT_ROWS = 2**20
 """Training samples that the input normalisation is fitted on, evenly spread; more would not move it."""
+WARM_UP = 200
+"""Batches over which the cosine schedule rises."""
 GATHER_ROWS = 16384
 """Rows gathered at once where the batch size does not matter; bounds memory."""
 ONEDNN_ACTIVATIONS = ("relu", "gelu")
@@ -40,7 +42,10 @@ ONEDNN_ACTIVATIONS = ("relu", "gelu")
 
 
 class Progress(NamedTuple):
-    """Where training is: ``epoch`` from 1, ``batch`` finished in it; ``record`` once the epoch is finished."""
+    """Where training is: ``epoch`` from 1, ``batch`` finished in it; ``record`` once the epoch is finished.
+
+    In epoch 0 the inputs are made: ``batch`` of ``batches`` samples are.
+    """
 
     epoch: int
     epochs: int
@@ -92,15 +97,23 @@ def train(
         torch.manual_seed(config.train.seed)
         model = Clone(config.model).to(device)
         optimiser = _optimiser(config.train, model)
+        for split_rows in (rows, validation_rows):
+            _check_whole(model, dataset, split_rows)
+        feed = Feed(
+            dataset,
+            model,
+            device,
+            group,
+            keep_bytes=config.data.keep_gb * 1e9,
+            rows=np.concatenate([rows, validation_rows]),
+            on_progress=lambda made, of: on_progress(Progress(0, config.train.epochs, made, of, None)),
+        )
         done = 0
         if run.checkpoint_path(RESUME).is_file():
             done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
         else:
-            model.inputs.fit(model.inputs.project(state).cpu() for state in _whole_states(model, dataset, rows))
-            for _ in _whole_states(model, dataset, validation_rows):
-                pass  # Nothing may be missing there either.
+            model.inputs.fit(feed.columns(rows[:: max(1, len(rows) // FIT_ROWS)]))
         group.share_weights(model)
-        feed = Feed(dataset, model, device, group)
         answer_of = partial(answer, model, precision=precision)
         loss_of = partial(model.head.loss, parameter_loss=cast(ParameterLoss, config.train.parameter_loss))
         batch_size = config.data.batch_size
@@ -121,6 +134,8 @@ def train(
             scores = Scores(device)
             model.train()
             for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size), 1):
+                for weights in optimiser.param_groups:
+                    weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
                 output = answer_of(inputs)
                 loss = loss_of(output, target, whole=whole)
                 optimiser.zero_grad(set_to_none=True)
@@ -151,15 +166,16 @@ def train(
     return run
 
 
-def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"]) -> tuple[Tensor, Tensor]:
+def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"]) -> Any:
     """What the head answers to normalised inputs, as `Clone.output` does but for rounding."""
     if precision == "bf16":
         with torch.autocast(inputs.device.type, torch.bfloat16):
             return model.answer(inputs)
-    if inputs.device.type == "cpu" and len(inputs) and model.config.activation in ONEDNN_ACTIVATIONS:
+    able = isinstance(model.trunk, nn.Sequential) and model.config.activation in ONEDNN_ACTIVATIONS
+    if able and inputs.device.type == "cpu" and len(inputs) and not model.config.dropout:
         # oneDNN instead of MKL, which takes twice the time on AMD, where it leaves AVX-512 unused.
         hidden: Tensor = model.trunk(inputs.to_mkldnn()).to_dense()
-        return cast(tuple[Tensor, Tensor], model.head(hidden))
+        return model.head(hidden)
     return model.answer(inputs)
 
 
@@ -203,7 +219,9 @@ def _check_resumable(config: Config, dataset: Dataset, run: Run) -> None:
             f"{run.path}: was trained on dataset {run.dataset_id} ({run.dataset_path}), "
             f"{dataset.path} is {dataset.id}; give the same dataset or begin a new run"
         )
-    changed = [text for text in differences(run.config, config) if text.partition(":")[0] not in MAY_CHANGE]
+    # Over how many epochs the cosine falls decides on every learning rate.
+    free = tuple(key for key in MAY_CHANGE if config.train.schedule == "constant" or key != "train.epochs")
+    changed = [text for text in differences(run.config, config) if text.partition(":")[0] not in free]
     if changed:
         raise RunError(f"{run.path}: cannot resume with other settings ({'; '.join(changed)}); begin a new run")
 
@@ -237,7 +255,12 @@ def _optimiser(config: TrainConfig, model: Clone) -> torch.optim.Optimizer:
         return torch.optim.RMSprop(weights, lr=rate, eps=epsilon)
     if config.optimiser == "adagrad":
         return torch.optim.Adagrad(weights, lr=rate, eps=epsilon)
-    return torch.optim.Adam(weights, lr=rate, betas=(config.betas[0], config.betas[1]), eps=epsilon, fused=True)
+    betas = (config.betas[0], config.betas[1])
+    if config.weight_decay:
+        return torch.optim.AdamW(
+            weights, lr=rate, betas=betas, eps=epsilon, weight_decay=config.weight_decay, fused=True
+        )
+    return torch.optim.Adam(weights, lr=rate, betas=betas, eps=epsilon, fused=True)
 
 
 def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
@@ -254,24 +277,32 @@ def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
     return rows[np.sort(chosen)]
 
 
-def _whole_states(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> Iterator[State]:
-    """Samples evenly spread over ``rows``, in chunks, once it is sure that they hold every value the inputs need."""
-    rows = rows[:: max(1, len(rows) // FIT_ROWS)]
-    device = next(model.parameters()).device
-    for start in range(0, len(rows), GATHER_ROWS):
-        part = rows[start : start + GATHER_ROWS]
-        state = dataset.state(part)
-        values = {f"ball_{name}": state.ball[:, index] for index, name in enumerate(("x", "y", "vx", "vy"))}
-        values |= {name: state.players[..., CHANNEL[name]].sum(1) for name in model.inputs.channels}
-        for name, column in values.items():
-            lacking = part[column.isnan().numpy()]
-            if len(lacking):
-                match = dataset.matches[int(dataset.match(lacking[:1]))]
+def _check_whole(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> None:
+    """See that the frames of these samples hold every value that the inputs need."""
+    frames = np.unique(dataset.samples["frame"].numpy()[rows])
+    needed = [name for name in model.inputs.channels if name in DETAIL]
+    for start in range(0, len(frames), GATHER_ROWS):
+        part = frames[start : start + GATHER_ROWS]
+        ball = dataset.frames["ball"].numpy()[part]
+        detail = dataset.frames["detail"].numpy()[part]
+        lacking = {f"ball_{name}": np.isnan(ball[:, index]) for index, name in enumerate(("x", "y", "vx", "vy"))}
+        lacking |= {name: (detail[..., DETAIL[name]] == MISSING).any(1) for name in needed}
+        for name, column in lacking.items():
+            if column.any():
+                match = dataset.matches[int(dataset.frames["match"][part[column][0]])]
                 raise DatasetError(
                     f"{dataset.path}: match {match['match_id']} has no {name} in its log, which the model needs; "
                     "make the dataset without it"
                 )
-        yield state.to(device)
+
+
+def learning_rate(config: TrainConfig, *, epoch: int, batch: int, batches: int) -> float:
+    """The learning rate of a batch, counted from 1 as ``epoch`` is."""
+    if config.schedule == "constant":
+        return config.learning_rate
+    done = (epoch - 1 + (batch - 1) / batches) / config.epochs
+    warm = min(1.0, ((epoch - 1) * batches + batch) / WARM_UP)
+    return config.learning_rate * warm * 0.5 * (1.0 + math.cos(math.pi * done))
 
 
 def _mixed(seed: int, epoch: int) -> int:

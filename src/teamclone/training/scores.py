@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from teamclone.models.heads import Prediction
 from teamclone.models.loss import Loss, issued, on, projected_parameters
-from teamclone.models.network import Prediction
 from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.training.group import ALONE, Group
@@ -29,7 +29,7 @@ class Scores:
         n = len(mask) if batch is None else batch
         parts = (
             loss.cross_entropy * n,
-            loss.parameter_mse * n,
+            loss.parameters * n,
             error.sum() / error.shape[1],
             (error * mask).sum(),
             mask.sum(),
@@ -42,19 +42,19 @@ class Scores:
     def table(self, group: Group = ALONE) -> dict[str, float]:
         """The figures over all processes; those of commands that never occurred are missing.
 
-        ``loss``, ``cross_entropy``, ``parameter_mse``: means per sample, of the training error and its parts.
+        ``loss``, ``cross_entropy``, ``parameter_loss``: means per sample, of the training error and its parts.
         ``accuracy``, ``recall_<command>``.
         ``parameter_mae``: the paper's, over all six outputs in [-1, 1] with zeros for those not issued.
         ``issued_mae``: the same over issued parameters only.
         """
         group.add_up(self.sums, self.confusion)
-        cross_entropy, mse, mae, issued_error, n_issued = self.sums.tolist()
+        cross_entropy, of_parameters, mae, issued_error, n_issued = self.sums.tolist()
         confusion = self.confusion.reshape(_N, _N).cpu()
         n = int(confusion.sum())
         values = {
-            "loss": (cross_entropy + mse) / n,
+            "loss": (cross_entropy + of_parameters) / n,
             "cross_entropy": cross_entropy / n,
-            "parameter_mse": mse / n,
+            "parameter_loss": of_parameters / n,
             "accuracy": int(confusion.trace()) / n,
             "parameter_mae": mae / n,
             "issued_mae": issued_error / n_issued,

@@ -11,7 +11,7 @@ from teamclone.rcss.player_types import DEFAULTS, FIELDS
 def states(batch: int = 1) -> State:
     """Everything at zero, all players of the default type, player 0 acts."""
     types = torch.tensor(list(DEFAULTS.values())).expand(batch, 22, len(FIELDS)).clone()
-    return State(
+    return State.now(
         ball=torch.zeros(batch, 4),
         players=torch.zeros(batch, 22, len(CHANNEL)),
         types=types,

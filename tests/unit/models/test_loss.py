@@ -5,7 +5,7 @@ from math import log
 import pytest
 import torch
 
-from teamclone.models.loss import Loss, ParameterLoss, clone_loss, issued, projected_parameters
+from teamclone.models.loss import Loss, ParameterLoss, point_loss, issued, projected_parameters
 from teamclone.models.state import Target
 
 TARGET = Target(
@@ -31,25 +31,25 @@ def test_the_papers_loss_by_hand() -> None:
     logits = torch.log(torch.tensor([[0.7, 0.1, 0.1, 0.1], [0.25, 0.25, 0.25, 0.25]]))
     predicted = torch.tensor([[0.5, 0.1, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.25, 0.0, 0.0, -0.3]])
     target = Target(*(part[:2] for part in TARGET))
-    loss = clone_loss(logits, predicted, target)
+    loss = point_loss(logits, predicted, target)
     # Row 0: dash direction off by .6, turn moment .2 where zero is asked; row 1: tackle direction -.3 likewise.
     mse = (0.6**2 + 0.2**2 + 0.3**2) / 12
     assert float(loss.cross_entropy) == pytest.approx(-(log(0.7) + log(0.25)) / 2)
-    assert float(loss.parameter_mse) == pytest.approx(mse)
+    assert float(loss.parameters) == pytest.approx(mse)
     assert float(loss.total) == pytest.approx(-(log(0.7) + log(0.25)) / 2 + mse)
 
 
 def test_masked_loss_looks_at_issued_parameters_only() -> None:
     predicted = torch.tensor([[0.5, 0.1, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.35, 0.0, 0.0, -0.3]])
     target = Target(*(part[:2] for part in TARGET))
-    loss = clone_loss(torch.zeros(2, 4), predicted, target, parameter_loss="masked")
+    loss = point_loss(torch.zeros(2, 4), predicted, target, parameter_loss="masked")
     # Three parameters were issued: dash power exact, dash direction off by .6, turn moment by .1.
-    assert float(loss.parameter_mse) == pytest.approx((0.6**2 + 0.1**2) / 3)
+    assert float(loss.parameters) == pytest.approx((0.6**2 + 0.1**2) / 3)
 
 
 def test_no_gradient_reaches_parameters_that_the_mask_hides() -> None:
     predicted = torch.full((4, 6), 0.9, requires_grad=True)
-    clone_loss(torch.zeros(4, 4), predicted, TARGET, parameter_loss="masked").total.backward()
+    point_loss(torch.zeros(4, 4), predicted, TARGET, parameter_loss="masked").total.backward()
     assert predicted.grad is not None
     assert torch.equal(predicted.grad != 0, issued(TARGET.kind))
 
@@ -65,9 +65,9 @@ def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterL
 
     def loss_of(part: slice) -> Loss:
         share = Target(kind[part], target.parameters[part])
-        return clone_loss(logits[part], projected[part], share, parameter_loss=parameter_loss, whole=kind)
+        return point_loss(logits[part], projected[part], share, parameter_loss=parameter_loss, whole=kind)
 
-    whole = clone_loss(logits, projected, target, parameter_loss=parameter_loss)
+    whole = point_loss(logits, projected, target, parameter_loss=parameter_loss)
     expected = torch.autograd.grad(whole.total, (logits, projected))
     shares = [loss_of(part) for part in (slice(0, 2), slice(2, 7), slice(7, 7))]
     for together, *parts in zip(whole, *shares, strict=True):

@@ -113,8 +113,8 @@ def test_rows_beyond_the_dataset_are_told(made: Dataset) -> None:
 class OtherFeatures(PaperFeatures):
     """Inputs that `Gather` does not know."""
 
-    def forward(self, state: object) -> torch.Tensor:
-        return super().forward(state) * 2  # type: ignore[arg-type]
+    def normalise(self, columns: torch.Tensor) -> torch.Tensor:
+        return super().normalise(columns) * 2
 
 
 def as_on_a_card(feed: Feed) -> None:

@@ -31,7 +31,7 @@ def test_figures_by_hand_over_unequal_batches() -> None:
         {
             "loss": (3 * 0.36 + 0.72) / 4,
             "cross_entropy": (3 * 0.3 + 0.7) / 4,
-            "parameter_mse": (3 * 0.06 + 0.02) / 4,
+            "parameter_loss": (3 * 0.06 + 0.02) / 4,
             "accuracy": 3 / 4,
             # .5 of dash power, .5 of dash direction, .2 of the turn moment not issued, .2 of kick power; 4 rows of 6.
             "parameter_mae": (0.5 + 0.5 + 0.2 + 0.2) / 24,

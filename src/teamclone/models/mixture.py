@@ -1,0 +1,109 @@
+"""Distributions of command parameters: mixtures of logistic components, cut off where the server cuts off.
+
+A logistic component is a bell with heavier tails than the normal one, whose distribution function is a plain sigmoid:
+what the server clips, all powers above 100 and turn moments beyond 180, is a part of the distribution in closed form.
+All densities are per unit of power or per degree of the command's argument.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+DEGREE = math.pi / 180.0
+LEAST_ANGLE = 0.03 * DEGREE
+LEAST_POWER = 0.03
+"""Smallest scales: agents write arguments to the thousandth, and no density may run away."""
+CLIPPED = 1e-2
+"""An argument so close to its bound, in its unit, was clipped to it."""
+
+
+class Mixture(NamedTuple):
+    """Components of one parameter, (batch, components) each: logits of their shares, centres, scales."""
+
+    logits: Tensor
+    centre: Tensor
+    scale: Tensor
+
+
+def scale_of(raw: Tensor, *, least: float, typical: float) -> Tensor:
+    """A scale from an unbounded output; ``typical`` for 0."""
+    return least + typical * torch.exp(raw.clamp(-8.0, 3.0))
+
+
+def wrap(angle: Tensor) -> Tensor:
+    """The same angle in [-pi, pi)."""
+    return torch.remainder(angle + math.pi, 2 * math.pi) - math.pi
+
+
+def _log_bell(away: Tensor, scale: Tensor) -> Tensor:
+    """Logarithm of the logistic density at a distance from its centre."""
+    z = away / scale
+    return -z - 2 * functional.softplus(-z) - torch.log(scale)
+
+
+def _mass(low: Tensor, high: Tensor, scale: Tensor) -> Tensor:
+    """Of a logistic bell around 0, the part between; taken on the side of its tail, where a difference is exact."""
+    flip = low + high > 0
+    low, high = torch.where(flip, -high, low), torch.where(flip, -low, high)
+    return torch.sigmoid(high / scale) - torch.sigmoid(low / scale)
+
+
+def power_terms(parts: Mixture, power: Tensor) -> Tensor:
+    """(batch, components) log-likelihoods of a power in 0..100 that each component alone gives it.
+
+    Args:
+        power: (batch,). At 0 or 100 it stands for all that a component has beyond.
+    """
+    away = power[:, None] - parts.centre
+    inside = _log_bell(away, parts.scale)
+    above = functional.logsigmoid(-(100.0 - parts.centre) / parts.scale)
+    below = functional.logsigmoid(-parts.centre / parts.scale)
+    terms = torch.where(power[:, None] >= 100.0 - CLIPPED, above, inside)
+    return torch.where(power[:, None] <= CLIPPED, below, terms)
+
+
+def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None) -> Tensor:
+    """(batch, components) log-likelihoods of an angle that each component, wrapped around the circle, gives it.
+
+    Args:
+        parts: centres and scales in radians.
+        degrees: (batch,) the argument.
+        factor: (batch,) arguments are the angle times this, clipped to 180 degrees; None for 1.
+    """
+    factor = torch.ones_like(degrees) if factor is None else factor
+    whole = torch.tanh(math.pi / (2 * parts.scale))  # of the bell within half a turn to each side
+    away = wrap((degrees / factor * DEGREE)[:, None] - parts.centre)
+    inside = _log_bell(away, parts.scale) - torch.log(whole) + math.log(DEGREE) - torch.log(factor)[:, None]
+    # What lies beyond the bound: an arc from it to straight behind, on the side of the argument.
+    bound = (math.pi / factor).clamp(max=0.99 * math.pi)
+    length = (math.pi - bound)[:, None]
+    start = torch.where(degrees > 0, bound, -math.pi)[:, None]
+    low = wrap(start - parts.centre)
+    high = low + length
+    over = (high - math.pi).clamp(min=0.0)
+    mass = _mass(low, high - over, parts.scale) + _mass(torch.full_like(over, -math.pi), over - math.pi, parts.scale)
+    beyond = torch.log((mass / whole).clamp(min=1e-12))
+    clipped = (degrees.abs() >= 180.0 - CLIPPED) & (factor > 1.02)
+    return torch.where(clipped[:, None], beyond, inside)
+
+
+def log_likelihood(logits: Tensor, terms: Tensor) -> Tensor:
+    """(batch,) of the mixture, from what each component gives."""
+    return torch.logsumexp(torch.log_softmax(logits, 1) + terms, 1)
+
+
+def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
+    """(batch,) the centre with the least expected distance to all: the median among the components.
+
+    A mean would lie between left and right, where nobody kicks.
+    """
+    distance = centre[:, :, None] - centre[:, None, :]
+    if angle:
+        distance = wrap(distance)
+    expected = (distance.abs() * logits.softmax(1)[:, :, None]).sum(1)
+    return centre.gather(1, expected.argmin(1, keepdim=True)).squeeze(1)

@@ -1,0 +1,411 @@
+"""Inputs seen from the player who acts: places relative to him and his body, times to the ball, what happened before.
+
+They come in blocks, each of which can be left out. None but ``role`` knows a player by his uniform number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING
+from teamclone.models.config import BLOCKS
+from teamclone.models.features import Normalisation, TypeParameters
+from teamclone.models.physics import (
+    NEVER,
+    STEPS,
+    Reach,
+    ball_after,
+    kick_rate,
+    kickable_area,
+    radians,
+    reach_ball,
+    tackle_failure,
+)
+from teamclone.models.state import CHANNEL, TYPE_FIELD, State
+from teamclone.rcss import pitch
+from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.player_types import GROUPS
+
+PAST_FRAMES = 3
+NEAREST_OPPONENTS = 6
+RIVALS = 3
+MATES = 10
+CLIP = 10.0
+"""Standard deviations to which inputs are limited, so that nothing unheard of leads far astray."""
+NEAR_M = 1.0
+NEAR_SHARE = 0.1
+"""How close to where he belongs a player lets it be: a metre, or this share of the distance to the ball."""
+
+GEOMETRY = (
+    "x", "y", "coast_x", "coast_y", "cos", "sin", "forward", "aside", "turn_factor", "decay", "dash_gain", "income",
+    "line_x", "near_m", "ball_x", "ball_y", "ball_vx", "ball_vy", "kick_gain", "turn_to_ball", "turn_to_meet",
+    *(f"mate_{mate}_{axis}" for mate in range(MATES) for axis in "xy"),
+)  # fmt: skip
+"""What makes a command of a place on the pitch or of a wanted motion; metres, metres per cycle, radians:
+
+x, y: the actor. coast_x, coast_y: where he comes to rest without a dash. cos, sin: of his body direction.
+forward, aside: his velocity along and across the body. turn_factor: turn moment for one degree. decay: of his velocity.
+dash_gain: speed that one unit of dash power gives. income: stamina that one cycle gives back.
+line_x: the offside line or the ball, whichever is further. near_m: see NEAR_SHARE.
+ball_x, ball_y, ball_vx, ball_vy: the ball. kick_gain: speed that one unit of kick power gives it.
+turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from where he rolls out to where he meets it.
+mate_0_x, ...: the team mates, the nearest first; where one is missing, the actor.
+"""
+
+
+class RelativeFeatures(nn.Module):
+    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is.
+
+    Args:
+        blocks: some of BLOCKS; ``scene`` is always among the columns.
+    """
+
+    channels = (
+        *("x", "y", "vx", "vy", "body", "neck", "view_width", "stamina", "effort", "recovery", "capacity", "type"),
+        *("flags", "last_command"),
+    )
+
+    def __init__(self, blocks: tuple[str, ...] = BLOCKS) -> None:
+        super().__init__()
+        self.blocks = tuple(block for block in BLOCKS if block in blocks)
+        self.history = PAST_FRAMES if "past" in blocks else 0
+        self.own_type = TypeParameters(tuple(GROUPS))
+        parts = self._parts(_blank(self.history))
+        self.names = (
+            *(f"{name}_{i}" for name in ("scene", *self.blocks) for i in range(parts[name].shape[1])),
+            *GEOMETRY,
+        )
+        self.n_inputs = len(self.names) - len(GEOMETRY)
+        self.normalisation = Normalisation(self.n_inputs)
+
+    def columns(self, blocks: tuple[str, ...]) -> list[int]:
+        """Places of the columns of ``scene`` and of some blocks."""
+        return [
+            i for i, name in enumerate(self.names[: self.n_inputs]) if name.rpartition("_")[0] in ("scene", *blocks)
+        ]
+
+    def project(self, state: State) -> Tensor:
+        """(batch, len(names)) before normalisation."""
+        parts = self._parts(state)
+        return torch.cat([parts[name] for name in ("scene", *self.blocks, "geometry")], dim=1)
+
+    def fit(self, chunks: Iterable[Tensor]) -> None:
+        """Fit the normalisation on what `project` makes of the training samples, chunk by chunk."""
+        self.normalisation.fit(chunk[:, : self.n_inputs] for chunk in chunks)
+
+    def normalise(self, columns: Tensor) -> Tensor:
+        """(batch, len(names)) of what `project` gives; GEOMETRY stays."""
+        inputs, geometry = columns[:, : self.n_inputs], columns[:, self.n_inputs :]
+        return torch.cat([self.normalisation(inputs).clamp(-CLIP, CLIP), geometry], dim=1)
+
+    def forward(self, state: State) -> Tensor:
+        return self.normalise(self.project(state))
+
+    def _parts(self, state: State) -> dict[str, Tensor]:
+        """Every block by name, and ``geometry``; (batch, columns) each."""
+        ball, players, types, actor = state.ball, state.players, state.types, state.actor
+        me, my_type = _of(players, actor), _of(types, actor)
+        body = radians(me[:, CHANNEL["body"]])
+        view = _View(me[:, [CHANNEL["x"], CHANNEL["y"]]], body)
+        flags = players[..., CHANNEL["flags"]].long()
+        on_field = (flags & FLAG_ON_FIELD) != 0
+        position = players[..., [CHANNEL["x"], CHANNEL["y"]]]
+        motion = players[..., [CHANNEL["vx"], CHANNEL["vy"]]]
+        own_motion = view.turn(_of(motion, actor))
+        speed = own_motion.norm(dim=1)
+        number = torch.arange(22, device=ball.device)
+        mate = on_field & (number < 11) & (number != actor[:, None])
+        opponent = on_field & (number >= 11)
+
+        # Who has the ball now.
+        to_ball = (position - ball[:, None, :2]).norm(dim=2)
+        own_ball_m = _of(to_ball, actor)
+        to_me = (position - view.origin[:, None]).norm(dim=2)
+        areas = kickable_area(types)
+        free = (flags & FLAG_TACKLING) == 0
+        doubt = (0.02 * (to_me + own_ball_m[:, None])).clamp(max=0.5)
+        mate_has_it = (mate & free & (to_ball < areas)).any(1)
+        opponent_gap = torch.where(opponent & free, to_ball - areas - doubt, NEVER).amin(1)
+        held = opponent_gap < 0
+        reach = reach_ball(ball, players, types, held=held, actor=actor)
+
+        # Times to the ball, and where it will be then.
+        own_steps = _of(reach.steps, actor)
+        mates, opponents = torch.where(mate, reach.steps, NEVER), torch.where(opponent, reach.steps, NEVER)
+        mates2, opponents2 = (-(-side).topk(2, dim=1).values for side in (mates, opponents))
+        first = torch.minimum(torch.minimum(own_steps, mates2[:, 0]), opponents2[:, 0])
+        meetings = [ball_after(reach, steps) for steps in (own_steps, mates2[:, 0], opponents2[:, 0], first)]
+        relative = [view.polar(place) for place in meetings]
+        steps = torch.stack([own_steps, mates2[:, 0], mates2[:, 1], opponents2[:, 0], opponents2[:, 1], first], 1)
+        rank = (mates < own_steps[:, None]).sum(1).to(ball.dtype)
+
+        # Lines.
+        defenders = torch.where(opponent, position[..., 0], -NEVER).topk(2, dim=1).values[:, 1]
+        next_ball = ball[:, :2] + ball[:, 2:]
+        line = torch.stack([defenders, torch.zeros_like(defenders), next_ball[:, 0], meetings[3][:, 0]], 1).amax(1)
+        limit = torch.maximum(line, torch.where(mates2[:, 0] < STEPS, meetings[1][:, 0], line))
+        ours = torch.where(on_field & (number < 11), position[..., 0], NEVER)
+        last_line = torch.minimum((-(-ours).topk(2, dim=1).values)[:, 1].clamp(max=0.0), ball[:, 0])
+        x = view.origin[:, 0]
+
+        parts = {
+            "scene": torch.cat(
+                [
+                    _pitch(view.origin),
+                    _pitch(ball[:, :2]),
+                    ball[:, 2:],
+                    *(_pitch(place) for place in meetings),
+                    steps.clamp(max=STEPS) / 20,
+                    torch.stack([line, limit, last_line], 1) / pitch.HALF_LENGTH,
+                ],
+                1,
+            ),
+            "self": torch.cat(
+                [
+                    torch.stack([view.cos, view.sin, speed], 1),
+                    own_motion,
+                    torch.stack(
+                        [
+                            me[:, CHANNEL["stamina"]] / 8000,
+                            (me[:, CHANNEL["stamina"]] - 2400).clamp(-100, 100) / 100,
+                            (me[:, CHANNEL["stamina"]] - 4800).clamp(-800, 800) / 800,
+                            me[:, CHANNEL["effort"]],
+                            me[:, CHANNEL["recovery"]],
+                            me[:, CHANNEL["capacity"]] / 130600,
+                        ],
+                        1,
+                    ),
+                    torch.stack(
+                        [((_of(flags, actor) & flag) != 0) for flag in (FLAG_TACKLING, FLAG_CHARGED, FLAG_COLLIDED)], 1
+                    ).to(ball.dtype),
+                ],
+                1,
+            ),
+            "role": functional.one_hot(actor, 11).to(ball.dtype),
+            "type": self.own_type(my_type[:, None]).flatten(1),
+            "last": _last(players, actor),
+            "view": _sight(me),
+            "ball": _ball(ball, view, own_motion, areas=_of(areas, actor)),
+            "reach": torch.cat(
+                [
+                    own_steps[:, None].clamp(max=6) / 6,
+                    torch.stack(
+                        [
+                            own_steps - mates2[:, 0],
+                            own_steps - opponents2[:, 0],
+                            mates2[:, 0] - opponents2[:, 0],
+                            torch.minimum(own_steps, mates2[:, 0]) - opponents2[:, 0],
+                        ],
+                        1,
+                    ).clamp(-6, 6)
+                    / 6,
+                    torch.stack([rank / 5, mate_has_it.to(ball.dtype), held.to(ball.dtype)], 1),
+                    opponent_gap[:, None].clamp(-1, 1),
+                    *relative,
+                ],
+                1,
+            ),
+            "lines": torch.stack(
+                [
+                    (line - x) / 20,
+                    (line - x).clamp(-2, 2),
+                    (limit - x).clamp(-3, 3),
+                    (last_line - x) / 20,
+                    (last_line - x).clamp(-1, 1),
+                    (ball[:, 0] - last_line - 20).clamp(-2, 2),
+                    (ball[:, 0] - x - 10).clamp(-5, 5) / 5,
+                ],
+                1,
+            ),
+        }
+        others = _others(players, view, body, reach, to_ball)
+        parts["mates"] = _nearest(others, torch.where(mate, to_me, NEVER), mate, MATES)
+        parts["opponents"] = _nearest(others, torch.where(opponent, to_me, NEVER), opponent, NEAREST_OPPONENTS)
+        parts["rivals"] = _nearest(others, torch.where(opponent, to_ball, NEVER), opponent, RIVALS)
+        if self.history:
+            parts["past"] = _past(state, me, view)
+
+        decay = my_type[:, TYPE_FIELD["player_decay"]]
+        inertia = my_type[:, TYPE_FIELD["inertia_moment"]]
+        coast = view.origin + _of(motion, actor) / (1 - decay)[:, None]
+        rolled = (1 - decay ** own_steps.clamp(max=STEPS)) / (1 - decay)
+        at_meeting = view.origin + _of(motion, actor) * rolled[:, None]
+        parts["geometry"] = torch.cat(
+            [
+                view.origin,
+                coast,
+                torch.stack([view.cos, view.sin], 1),
+                own_motion,
+                torch.stack(
+                    [
+                        1 + inertia * speed,
+                        decay,
+                        me[:, CHANNEL["effort"]] * my_type[:, TYPE_FIELD["dash_power_rate"]],
+                        me[:, CHANNEL["recovery"]] * my_type[:, TYPE_FIELD["stamina_inc_max"]],
+                        limit,
+                        (NEAR_SHARE * own_ball_m).clamp(min=NEAR_M),
+                    ],
+                    1,
+                ),
+                ball,
+                torch.stack(
+                    [
+                        kick_rate(ball[:, :2] - view.origin, body, my_type),
+                        view.angle(next_ball - view.origin - _of(motion, actor)),
+                        view.angle(meetings[0] - at_meeting),
+                    ],
+                    1,
+                ),
+                _nearest(position - view.origin[:, None], torch.where(mate, to_me, NEVER), mate, MATES)
+                + view.origin.repeat(1, MATES),
+            ],
+            1,
+        )
+        return parts
+
+
+class _View:
+    """The acting player's frame of reference: he is the origin (batch, 2), his body points along the first axis."""
+
+    def __init__(self, origin: Tensor, body: Tensor) -> None:
+        self.origin, self.cos, self.sin = origin, torch.cos(body), torch.sin(body)
+
+    def turn(self, vector: Tensor) -> Tensor:
+        """(batch, ..., 2) vectors of the pitch in his axes."""
+        shape = (len(vector), *(1 for _ in vector.shape[1:-1]))
+        cos, sin = self.cos.view(shape), self.sin.view(shape)
+        x, y = vector[..., 0], vector[..., 1]
+        return torch.stack([x * cos + y * sin, y * cos - x * sin], -1)
+
+    def see(self, place: Tensor) -> Tensor:
+        """(batch, ..., 2) places on the pitch relative to him."""
+        shape = (len(place), *(1 for _ in place.shape[1:-1]), 2)
+        return self.turn(place - self.origin.view(shape))
+
+    def polar(self, place: Tensor) -> Tensor:
+        """(batch, 5) relative place in 20 m, its distance (logarithm) and direction (cosine, sine)."""
+        return _polar(self.see(place))
+
+    def angle(self, vector: Tensor) -> Tensor:
+        """(batch,) radians from his body to a vector of the pitch."""
+        turned = self.turn(vector)
+        return torch.atan2(turned[:, 1], turned[:, 0])
+
+
+def _polar(relative: Tensor) -> Tensor:
+    distance = torch.sqrt(relative.square().sum(-1, keepdim=True) + 1e-8)
+    return torch.cat([relative / 20, torch.log(distance + 0.1), relative / distance], -1)
+
+
+def _of(values: Tensor, actor: Tensor) -> Tensor:
+    """(batch, ...) the acting player's part of (batch, players, ...)."""
+    index = actor.view(-1, 1, *(1 for _ in values.shape[2:])).expand(-1, 1, *values.shape[2:])
+    return values.gather(1, index).squeeze(1)
+
+
+def _pitch(place: Tensor) -> Tensor:
+    """(batch, 2) a place on the pitch, in halves of its length and width."""
+    return torch.stack([place[:, 0] / pitch.HALF_LENGTH, place[:, 1] / pitch.HALF_WIDTH], 1)
+
+
+def _sight(me: Tensor) -> Tensor:
+    """(batch, 3) where the actor looks, relative to his body, and how wide."""
+    neck = radians(me[:, CHANNEL["neck"]])
+    return torch.stack([torch.cos(neck), torch.sin(neck), me[:, CHANNEL["view_width"]] / 180], 1)
+
+
+def _last(players: Tensor, actor: Tensor) -> Tensor:
+    """(batch, 9) what the actor did in the cycle before, one-hot, and whether a team mate or an opponent kicked."""
+    kinds = players[..., CHANNEL["last_command"]].long().clamp(0, CommandKind.MOVE)
+    own = functional.one_hot(_of(kinds, actor), CommandKind.MOVE + 1).to(players.dtype)
+    kicked = (kinds == CommandKind.KICK).to(players.dtype).scatter(1, actor[:, None], 0.0)
+    return torch.cat([own, kicked[:, :11].amax(1, keepdim=True), kicked[:, 11:].amax(1, keepdim=True)], 1)
+
+
+def _ball(ball: Tensor, view: _View, motion: Tensor, *, areas: Tensor) -> Tensor:
+    """(batch, 19) the ball as the actor has it before him, now and in the next cycle."""
+    now = view.see(ball[:, :2])
+    ahead = view.see(ball[:, :2] + ball[:, 2:]) - motion
+    velocity = view.turn(ball[:, 2:])
+    gap, next_gap = now.norm(dim=1) - areas, ahead.norm(dim=1) - areas
+    turn = torch.atan2(ahead[:, 1], ahead[:, 0]) * (180 / math.pi)
+    return torch.cat(
+        [
+            _polar(now),
+            _polar(ahead),
+            velocity,
+            velocity.norm(dim=1, keepdim=True),
+            torch.stack(
+                [
+                    gap.clamp(-0.5, 0.5) * 4,
+                    (gap <= -0.055).to(ball.dtype),
+                    next_gap.clamp(-1, 1) * 2,
+                    1 - tackle_failure(now[:, 0], now[:, 1]).clamp(max=2.0),
+                    (turn / 10).clamp(-1, 1),
+                    turn.clamp(-2, 2) / 2,
+                ],
+                1,
+            ),
+        ],
+        1,
+    )
+
+
+def _others(players: Tensor, view: _View, body: Tensor, reach: Reach, to_ball: Tensor) -> Tensor:
+    """(batch, 22, 11) every player as the actor has him before him."""
+    place = view.see(players[..., [CHANNEL["x"], CHANNEL["y"]]])
+    motion = view.turn(players[..., [CHANNEL["vx"], CHANNEL["vy"]]])
+    facing = radians(players[..., CHANNEL["body"]]) - body[:, None]
+    rest = torch.stack(
+        [torch.cos(facing), torch.sin(facing), reach.steps.clamp(max=STEPS) / 20, to_ball.clamp(max=60) / 20], -1
+    )
+    return torch.cat([_polar(place), motion, rest], -1)
+
+
+def _nearest(others: Tensor, distance: Tensor, there: Tensor, count: int) -> Tensor:
+    """(batch, count * columns) the nearest first; zeros for those who are not there."""
+    nearest = (-distance).topk(count, dim=1).indices
+    chosen = others.gather(1, nearest[..., None].expand(-1, -1, others.shape[2]))
+    return (chosen * there.gather(1, nearest)[..., None]).flatten(1)
+
+
+def _past(state: State, me: Tensor, view: _View) -> Tensor:
+    """(batch, frames * columns) the actor and the ball in the frames before, from where he is now; zeros if unknown."""
+    columns = []
+    for back in range(state.past_known.shape[1]):
+        then, known = _of(state.past_players[:, back], state.actor), state.past_known[:, back, None]
+        turned = radians(me[:, CHANNEL["body"]] - then[:, CHANNEL["body"]])
+        seen = torch.cat(
+            [
+                view.see(then[:, [CHANNEL["x"], CHANNEL["y"]]]),
+                view.turn(then[:, [CHANNEL["vx"], CHANNEL["vy"]]]),
+                view.see(state.past_ball[:, back, :2]) / 20,
+                view.turn(state.past_ball[:, back, 2:]),
+                torch.stack([torch.cos(turned), torch.sin(turned)], 1),
+                (me - then)[:, CHANNEL["stamina"], None] / 100,
+                _last(state.past_players[:, back], state.actor),
+                torch.ones_like(then[:, :1]),
+            ],
+            1,
+        )
+        columns.append(torch.where(known, seen, 0.0))
+    return torch.cat(columns, 1)
+
+
+def _blank(history: int) -> State:
+    """One situation of zeros: to see how many columns there are."""
+    n_channels, n_fields = len(CHANNEL), len(TYPE_FIELD)
+    return State(
+        ball=torch.zeros(1, 4),
+        players=torch.zeros(1, 22, n_channels),
+        types=torch.full((1, 22, n_fields), 0.5),
+        actor=torch.zeros(1, dtype=torch.int64),
+        past_ball=torch.zeros(1, history, 4),
+        past_players=torch.zeros(1, history, 22, n_channels),
+        past_known=torch.zeros(1, history, dtype=torch.bool),
+    )

@@ -82,10 +82,11 @@ class PointHead(nn.Module):
         target: Target,
         *,
         parameter_loss: ParameterLoss = "paper",
+        weight: float = 1.0,
         whole: Tensor | None = None,
     ) -> Loss:
         logits, projected = output
-        return point_loss(logits, projected, target, parameter_loss=parameter_loss, whole=whole)
+        return point_loss(logits, projected, target, parameter_loss=parameter_loss, weight=weight, whole=whole)
 
 
 class Distribution(NamedTuple):
@@ -212,10 +213,11 @@ class MixtureHead(nn.Module):
         target: Target,
         *,
         parameter_loss: ParameterLoss = "paper",
+        weight: float = 1.0,
         whole: Tensor | None = None,
     ) -> Loss:
         """Negative log-likelihood of command and parameters together; ``parameter_loss`` does not apply."""
-        return mixture_loss(output.logits, self.log_likelihood(output, target), target, whole=whole)
+        return mixture_loss(output.logits, self.log_likelihood(output, target), target, weight=weight, whole=whole)
 
     @staticmethod
     def log_likelihood(output: Distribution, target: Target) -> Tensor:

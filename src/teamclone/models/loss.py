@@ -21,7 +21,7 @@ _KIND = torch.tensor([CLONED_KINDS.index(parameter.kind) for parameter in PARAME
 
 
 class Loss(NamedTuple):
-    """The training error and its two parts, scalars: ``total = cross_entropy + parameters``."""
+    """The training error and its two parts, scalars: ``total = cross_entropy + weight * parameters``."""
 
     total: Tensor
     cross_entropy: Tensor
@@ -52,9 +52,10 @@ def point_loss(
     target: Target,
     *,
     parameter_loss: ParameterLoss = "paper",
+    weight: float = 1.0,
     whole: Tensor | None = None,
 ) -> Loss:
-    """Cross-entropy plus mean squared error, unweighted (section II-B of the paper).
+    """Cross-entropy plus mean squared error, in the paper unweighted (section II-B).
 
     Args:
         logits: (batch, 4).
@@ -62,6 +63,7 @@ def point_loss(
         target: what the players did.
         parameter_loss: "paper" takes the error over all six outputs, whose target is zero where the parameter was not
             issued; "masked" only over the issued ones.
+        weight: of the squared error.
         whole: (n,) commands of the batch of which these samples are a share: the means are taken over it, so that the
             losses of all shares add up to that of the batch. None where they are the batch.
     """
@@ -72,16 +74,18 @@ def point_loss(
         mse = (squared * issued(target.kind)).sum() / issued(whole).sum()
     else:
         mse = squared.sum() / (len(whole) * len(PARAMETERS))
-    return Loss(cross_entropy + mse, cross_entropy, mse)
+    return Loss(cross_entropy + weight * mse, cross_entropy, mse)
 
 
-def mixture_loss(logits: Tensor, log_likelihood: Tensor, target: Target, *, whole: Tensor | None = None) -> Loss:
+def mixture_loss(
+    logits: Tensor, log_likelihood: Tensor, target: Target, *, weight: float = 1.0, whole: Tensor | None = None
+) -> Loss:
     """Mean negative log-likelihood of the command and, given the command, of its parameters.
 
     Args:
-        logits: (batch, 4). log_likelihood: (batch,) of the parameters. target, whole: as of `point_loss`.
+        logits: (batch, 4). log_likelihood: (batch,) of the parameters. target, weight, whole: as of `point_loss`.
     """
     n = len(target.kind if whole is None else whole)
     cross_entropy = functional.cross_entropy(logits, target.kind, reduction="sum") / n
     parameters = -log_likelihood.sum() / n
-    return Loss(cross_entropy + parameters, cross_entropy, parameters)
+    return Loss(cross_entropy + weight * parameters, cross_entropy, parameters)

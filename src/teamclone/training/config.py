@@ -46,6 +46,7 @@ class TrainConfig:
         betas: Adam's two decay rates; no other optimiser has them.
         epsilon: added to the optimiser's denominator.
         parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
+        parameter_weight: of the parameters' error beside that of the command.
         precision: fp32, bf16 (autocast), or auto: bf16 where the processor computes in it.
         device: cpu, cuda, or auto: cuda where there is one.
         threads: of the processor; 0 takes all.
@@ -61,6 +62,7 @@ class TrainConfig:
     betas: tuple[float, ...] = (0.9, 0.999)
     epsilon: float = 1e-7
     parameter_loss: str = "paper"
+    parameter_weight: float = 1.0
     precision: str = "auto"
     device: str = "auto"
     threads: int = 0
@@ -104,6 +106,7 @@ _AT_LEAST: dict[str, float] = {
     "model.dropout": 0,
     "data.keep_gb": 0,
     "train.weight_decay": 0,
+    "train.parameter_weight": 0,
     "train.epochs": 1,
     "train.threads": 0,
     "train.seed": 0,

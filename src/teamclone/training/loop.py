@@ -115,7 +115,11 @@ def train(
             model.inputs.fit(feed.columns(rows[:: max(1, len(rows) // FIT_ROWS)]))
         group.share_weights(model)
         answer_of = partial(answer, model, precision=precision)
-        loss_of = partial(model.head.loss, parameter_loss=cast(ParameterLoss, config.train.parameter_loss))
+        loss_of = partial(
+            model.head.loss,
+            parameter_loss=cast(ParameterLoss, config.train.parameter_loss),
+            weight=config.train.parameter_weight,
+        )
         batch_size = config.data.batch_size
         journal = stack.enter_context(Journal(run, done)) if group.rank == 0 else None
         began = time.monotonic()

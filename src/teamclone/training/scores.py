@@ -18,7 +18,7 @@ class Scores:
     """Sums over all samples seen so far. They stay on the device: no batch waits for a number."""
 
     def __init__(self, device: torch.device) -> None:
-        self.sums = torch.zeros(5, dtype=torch.float64, device=device)
+        self.sums = torch.zeros(6, dtype=torch.float64, device=device)
         self.confusion = torch.zeros(_N * _N, dtype=torch.int64, device=device)
 
     @torch.no_grad()
@@ -28,6 +28,7 @@ class Scores:
         error = (prediction.parameters / on(mask.device)[0] - projected_parameters(target)).abs()
         n = len(mask) if batch is None else batch
         parts = (
+            loss.total * n,
             loss.cross_entropy * n,
             loss.parameters * n,
             error.sum() / error.shape[1],
@@ -48,11 +49,11 @@ class Scores:
         ``issued_mae``: the same over issued parameters only.
         """
         group.add_up(self.sums, self.confusion)
-        cross_entropy, of_parameters, mae, issued_error, n_issued = self.sums.tolist()
+        total, cross_entropy, of_parameters, mae, issued_error, n_issued = self.sums.tolist()
         confusion = self.confusion.reshape(_N, _N).cpu()
         n = int(confusion.sum())
         values = {
-            "loss": (cross_entropy + of_parameters) / n,
+            "loss": total / n,
             "cross_entropy": cross_entropy / n,
             "parameter_loss": of_parameters / n,
             "accuracy": int(confusion.trace()) / n,

@@ -5,7 +5,7 @@ from math import log
 import pytest
 import torch
 
-from teamclone.models.loss import Loss, ParameterLoss, point_loss, issued, projected_parameters
+from teamclone.models.loss import Loss, ParameterLoss, issued, point_loss, projected_parameters
 from teamclone.models.state import Target
 
 TARGET = Target(

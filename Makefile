@@ -6,16 +6,19 @@ BIN := $(VENV)/bin
 MATCHES ?= samples
 TEAM ?= HELIOS_base
 KILLS ?= 50
+FIDELITY := .fidelity
+OPTIONS ?=
 MINUTES ?= 30
 DEMO := demo
 
-.PHONY: help install browser demo test lint format bench faults fuzz clean
+.PHONY: help install browser demo test lint format bench fidelity faults fuzz clean
 
 help:
 	@echo "make demo     train and report a clone of HELIOS_base on the bundled matches"
 	@echo "make test     run the tests"
 	@echo "make lint     ruff and mypy"
 	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name)"
+	@echo "make fidelity what clones know, and docs/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
 	@echo "make faults   kill ingest, dataset and train KILLS times each and resume (default 50)"
 	@echo "make fuzz     fuzz every log reader for MINUTES (default 30)"
 	@echo "make install  only set up $(VENV)"
@@ -65,6 +68,9 @@ bench: install
 	$(BIN)/python benchmarks/training.py .bench/dataset
 	$(BIN)/python benchmarks/stores.py $(MATCHES) --count 2
 
+fidelity: install
+	$(BIN)/python benchmarks/fidelity.py $(MATCHES) --out $(FIDELITY) --page docs/fidelity.md --team $(TEAM) $(OPTIONS)
+
 faults: install
 	$(BIN)/python -m pytest tests/faults --kills $(KILLS) --timeout 0
 
@@ -73,4 +79,4 @@ fuzz: install
 	$(BIN)/python tests/faults/fuzz_readers.py .fuzz --minutes $(MINUTES)
 
 clean:
-	rm -rf $(VENV) $(DEMO) .bench .fuzz build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEMO) .bench $(FIDELITY) .fuzz build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

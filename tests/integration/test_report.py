@@ -21,8 +21,9 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import DatasetError, RunError
 from teamclone.evaluation import latency, metrics
-from teamclone.evaluation.evaluate import evaluate, load_evaluation, model_id, predict
+from teamclone.evaluation.evaluate import evaluate, load_evaluation, predict
 from teamclone.evaluation.report import make_report, number, percent
+from teamclone.models.network import model_id
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.training.checkpoint import save_weights
 from teamclone.training.config import load_config
@@ -362,3 +363,63 @@ def test_report_in_a_browser(written: Path, tmp_path: Path, scheme: str, width: 
     assert tuple(pixels[5, 5]) == paper
     ink = np.abs(pixels - paper).sum(axis=2)
     assert ink.max() > 400, "text stands out from the paper"
+
+
+def test_distributions_are_judged_by_their_likelihood(tmp_path: Path) -> None:
+    data = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=40))
+    small = ["model.hidden=[16]", "model.aim_hidden=[16]", "model.kick_hidden=[16]", "train.epochs=1"]
+    machine = ["train.threads=1", "train.device=cpu", "train.precision=fp32"]
+    run = train(load_config("best", [*small, *machine, "data.batch_size=100"]), data, tmp_path / "run")
+    html = make_report(run, quick_predictions=0).read_text()
+    section = load_evaluation(run.path / "evaluation.json")["splits"]["test"]
+    rows, model = data.split(Split.TEST), run.load_model()
+    with torch.no_grad():
+        likelihood = model.head.log_likelihood(model.output(data.state(rows)), data.target(rows)).numpy()
+    for kind, name in enumerate(kind.name.lower() for kind in CLONED_KINDS):
+        loss = section["commands"][name]["parameter_log_loss"]["value"]
+        assert loss == pytest.approx(-likelihood[data.target(rows).kind.numpy() == kind].mean(), rel=1e-4)
+        assert f"<td>{number(loss, 2)}</td>" in html
+    assert "<h3>Distributions</h3>" in html
+    assert "negative log-likelihood, nats" in html
+    assert "zero is expected of its parameters" not in html
+    printed = CliRunner().invoke(app, ["evaluate", str(run.path)], catch_exceptions=False).stdout
+    assert "log loss of its parameters, nats" in printed
+
+
+def test_points_have_no_likelihood(written: Path) -> None:
+    splits = load_evaluation(written / "evaluation.json")["splits"]
+    nothing = {"value": None, "low": None, "high": None}
+    assert all(row["parameter_log_loss"] == nothing for split in splits.values() for row in split["commands"].values())
+    assert "Distributions" not in (written / "report.html").read_text()
+
+
+def test_a_clone_of_several_teams(tmp_path: Path) -> None:
+    """Entries 1 and 2 are one match, seen from both teams."""
+    splits = np.repeat([Split.TRAIN, Split.TEST, Split.TEST, Split.VALIDATION], 20 * 10)
+    document = make_dataset(tmp_path / "ds", frames_per_match=20, **{"samples/split": splits}) / "dataset.json"
+    meta = json.loads(document.read_text())
+    ids, teams = ("m0", "m1", "m1", "m2"), ("Red", "Red", "Blue", "Blue")
+    for entry, match_id, team in zip(meta["matches"], ids, teams, strict=True):
+        entry |= {"match_id": match_id, "team": team, "opponent": "Blue" if team == "Red" else "Red"}
+    meta |= {"team": "Red + Blue", "teams": ["Red", "Blue"]}
+    document.write_text(json.dumps(meta))
+    config = load_config("small", ["model.hidden=[8]", "train.epochs=1", "train.threads=1", "train.device=cpu"])
+    run = train(config, open_dataset(tmp_path / "ds"), tmp_path / "run")
+    html = make_report(run, quick_predictions=0).read_text()
+    evaluation = load_evaluation(run.path / "evaluation.json")
+    test = evaluation["splits"]["test"]
+    assert [(row["match_id"], row["rows"]) for row in test["matches"]] == [("m1", 400)]
+    assert test["model"]["accuracy"]["low"] is None
+    assert [(row["opponent"], row["matches"], row["rows"]) for row in test["opponents"]] in (
+        [("Red", 1, 200), ("Blue", 1, 200)],
+        [("Blue", 1, 200), ("Red", 1, 200)],
+    )
+    assert evaluation["data"]["matches"] == 3
+    assert "In one match it never saw, the clone names the next command of a Red + Blue player" in html
+    assert "--team Red --team Blue" in html
+    assert '<th class="text">team</th>' in html
+    other = open_dataset(make_dataset(tmp_path / "other", frames_per_match=10))
+    document = other.path / "dataset.json"
+    renamed = [entry | {"match_id": "m0"} for entry in json.loads(document.read_text())["matches"]]
+    document.write_text(json.dumps(other.meta | {"matches": renamed}))
+    assert evaluate(run, dataset=other.path)["dataset"]["trained_on_before"] == ["m0"]

@@ -106,7 +106,7 @@ def test_every_command_takes_the_url(url: str, fixtures_dir: Path, tmp_path: Pat
 def test_a_dataset_is_the_same_from_either_store(url: str, samples: Path, reference: Store, tmp_path: Path) -> None:
     assert ingest([samples], create_store(url), jobs=1).added == N_MATCHES
     same(open_store(url), reference)
-    config = DatasetConfig(team="HELIOS_base")
+    config = DatasetConfig(teams=("HELIOS_base",))
     for name, store in (("parquet", reference), ("postgresql", open_store(url))):
         build_dataset(config, store=store, out=tmp_path / name)
     files = {path.relative_to(tmp_path / "parquet") for path in (tmp_path / "parquet").rglob("*") if path.is_file()}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from tests.synthetic import make_dataset
 from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.models.network import Clone
 from teamclone.training.config import Config, load_config, to_table
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, open_run
@@ -195,47 +197,170 @@ def outcome(run: Run) -> tuple[Any, ...]:
     return tensors, figures(run), run.environment["threads"], run.environment["precision"]
 
 
-CHANGES: dict[str, Sequence[str]] = {
-    "model.own_type": ["model.own_type=true"],
-    "model.all_types": ["model.all_types=kick"],
-    "model.hidden": ["model.hidden=[17]"],
-    "model.activation": ["model.activation=tanh"],
-    "data.batch_size": ["data.batch_size=32"],
-    "data.batches_per_epoch": ["data.batches_per_epoch=2"],
-    "data.validation_batches": ["data.validation_batches=1"],
-    "train.epochs": ["train.epochs=1"],
-    "train.optimiser": ["train.optimiser=rmsprop"],
-    "train.learning_rate": ["train.learning_rate=0.01"],
-    "train.betas": ["train.betas=[0.8, 0.9]"],
-    "train.epsilon": ["train.epsilon=0.1"],
-    "train.parameter_loss": ["train.parameter_loss=masked"],
-    "train.precision": ["train.precision=bf16"],
-    "train.threads": ["train.threads=2"],
-    "train.seed": ["train.seed=1"],
-    "train.max_minutes": ["train.max_minutes=1e-9"],
+RELATIVE = (
+    "model.features=relative",
+    "model.blocks=self,role,ball",
+    "model.kick_blocks=self,ball,mates",
+    "model.aims=2",
+    "model.aim_hidden=8",
+    "model.kick_hidden=8",
+    "model.head=mixture",
+    "train.parameter_weight=0.1",
+)
+REMEDIES = (*RELATIVE, "train.balance=oversample", "train.calibrate=true", "data.mirror=0.5")
+BASES: dict[str, Sequence[str]] = {
+    "paper": (),
+    "relative": RELATIVE,
+    "weights": ("train.balance=weights",),
 }
-REFUSED = {"model.features", "train.device"}
-"""Only one value works here; the others are refused, which other tests show."""
+CHANGES: dict[str, tuple[str, Sequence[str]]] = {
+    "model.features": ("paper", ["model.features=relative", "model.blocks=self"]),
+    "model.own_type": ("paper", ["model.own_type=true"]),
+    "model.all_types": ("paper", ["model.all_types=kick"]),
+    "model.blocks": ("relative", ["model.blocks=self,role"]),
+    "model.kick_blocks": ("relative", ["model.kick_blocks=ball"]),
+    "model.aims": ("relative", ["model.aims=3"]),
+    "model.aim_hidden": ("relative", ["model.aim_hidden=9"]),
+    "model.kick_hidden": ("relative", ["model.kick_hidden=9"]),
+    "model.hidden": ("paper", ["model.hidden=[17]"]),
+    "model.activation": ("paper", ["model.activation=tanh"]),
+    "model.dropout": ("paper", ["model.dropout=0.5"]),
+    "model.head": ("relative", ["model.head=point", "model.kick_blocks=[]", "model.kick_hidden=[]"]),
+    "model.members": ("paper", ["model.members=2"]),
+    "data.batch_size": ("paper", ["data.batch_size=32"]),
+    "data.batches_per_epoch": ("paper", ["data.batches_per_epoch=2"]),
+    "data.validation_batches": ("paper", ["data.validation_batches=1"]),
+    "data.mirror": ("paper", ["data.mirror=0.5"]),
+    "train.epochs": ("paper", ["train.epochs=1"]),
+    "train.optimiser": ("paper", ["train.optimiser=rmsprop"]),
+    "train.learning_rate": ("paper", ["train.learning_rate=0.01"]),
+    "train.schedule": ("paper", ["train.schedule=cosine"]),
+    "train.weight_decay": ("paper", ["train.weight_decay=0.1"]),
+    "train.betas": ("paper", ["train.betas=[0.8, 0.9]"]),
+    "train.epsilon": ("paper", ["train.epsilon=0.1"]),
+    "train.parameter_loss": ("paper", ["train.parameter_loss=masked"]),
+    "train.parameter_weight": ("paper", ["train.parameter_weight=2"]),
+    "train.balance": ("paper", ["train.balance=undersample"]),
+    "train.balance_strength": ("weights", ["train.balance_strength=0.5"]),
+    "train.prior_correction": ("weights", ["train.prior_correction=false"]),
+    "train.calibrate": ("paper", ["train.calibrate=true"]),
+    "train.precision": ("paper", ["train.precision=bf16"]),
+    "train.threads": ("paper", ["train.threads=2"]),
+    "train.seed": ("paper", ["train.seed=1"]),
+    "train.max_minutes": ("paper", ["train.max_minutes=1e-9"]),
+}
+"""For each setting a base on which it has an effect, and what changes it."""
+REFUSED = {"train.device"}
+"""Only one value works here; the others are refused, which another test shows."""
+ONLY_SPEED = {"data.keep_gb"}
+"""No result may depend on it, but for rounding."""
 
 
 def test_every_setting_is_tried() -> None:
     known = {f"{section}.{key}" for section, values in to_table(Config()).items() for key in values}
-    assert set(CHANGES) | REFUSED == known
+    assert set(CHANGES) | REFUSED | ONLY_SPEED == known
 
 
 @pytest.fixture(scope="module")
-def usual(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, ...]:
-    return outcome(train(tiny("train.epochs=2"), dataset, tmp_path_factory.mktemp("usual") / "run"))
+def usual_of(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Any, ...]]:
+    """What comes of each base."""
+
+    @cache
+    def trained(base: str) -> tuple[Any, ...]:
+        config = tiny("train.epochs=2", *BASES[base])
+        return outcome(train(config, dataset, tmp_path_factory.mktemp("usual") / "run"))
+
+    return trained
+
+
+@pytest.fixture(scope="module")
+def usual(usual_of: Callable[[str], tuple[Any, ...]]) -> tuple[Any, ...]:
+    return usual_of("paper")
 
 
 @pytest.mark.parametrize("key", CHANGES)
-def test_every_setting_has_an_effect(dataset: Dataset, tmp_path: Path, usual: tuple[Any, ...], key: str) -> None:
-    changed = train(tiny("train.epochs=2", *CHANGES[key]), dataset, tmp_path / "run")
-    assert outcome(changed) != usual
+def test_every_setting_has_an_effect(
+    dataset: Dataset, tmp_path: Path, usual_of: Callable[[str], tuple[Any, ...]], key: str
+) -> None:
+    base, changes = CHANGES[key]
+    changed = train(tiny("train.epochs=2", *BASES[base], *changes), dataset, tmp_path / "run")
+    assert outcome(changed) != usual_of(base)
 
 
 def test_nothing_else_has_an_effect(dataset: Dataset, tmp_path: Path, usual: tuple[Any, ...]) -> None:
     assert outcome(train(tiny("train.epochs=2"), dataset, tmp_path / "run")) == usual
+
+
+def test_what_is_kept_in_memory_changes_no_result(dataset: Dataset, tmp_path: Path) -> None:
+    """Nothing, the plain inputs, or all; 4 bytes of each input of 500 training and 128 validation samples."""
+    inputs = len(Clone(tiny(*RELATIVE).model).inputs.names)
+    told: list[tuple[int, ...]] = []
+
+    def trained(keep_gb: float) -> dict[str, Any]:
+        made: list[Progress] = []
+        config = tiny(*REMEDIES, f"data.keep_gb={keep_gb}")
+        run = train(config, dataset, tmp_path / f"run{keep_gb}", on_progress=made.append)
+        told.append(tuple({at.batches for at in made if at.epoch == 0}))
+        return figures(run)[-1]
+
+    usual = trained(8.0)
+    assert trained(0.0) == pytest.approx(usual, rel=1e-4)
+    assert trained(4e-9 * inputs * 628) == pytest.approx(usual, rel=1e-4)
+    assert told == [(1128,), (), (628,)]
+
+
+def test_the_remedies_resume_bit_for_bit(dataset: Dataset, tmp_path: Path) -> None:
+    config = tiny(*REMEDIES, "train.schedule=cosine")
+    whole = train(config, dataset, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        train(config, dataset, tmp_path / "run", on_progress=stop_at(3, 2))
+    resumed = train(config, dataset, tmp_path / "run", resume=True)
+    assert figures(resumed) == figures(whole)
+    assert weights(resumed) == weights(whole)
+
+
+def test_a_calibrated_model_answers_at_the_temperature_of_its_record(dataset: Dataset, tmp_path: Path) -> None:
+    settings = ("data.validation_batches=0", "train.epochs=2")
+    plain = train(tiny(*settings), dataset, tmp_path / "plain")
+    run = train(tiny(*settings, "train.calibrate=true"), dataset, tmp_path / "run")
+    rows = dataset.split(Split.VALIDATION)
+    kind = dataset.target(rows).kind
+    model, raw = (of.load_model("last") for of in (run, plain))
+    for mine, theirs in zip(model.parameters(), raw.parameters(), strict=True):
+        assert torch.equal(mine, theirs), "training looks at raw logits"
+    record, before = run.history()[-1], plain.history()[-1]
+    assert record["temperature"] != pytest.approx(1.0, abs=0.01)
+    assert float(model.head.temperature) == pytest.approx(record["temperature"])
+    for of, told in ((model, record), (raw, before)):
+        probability = of.predict(dataset.state(rows))[0].gather(1, kind[:, None])
+        assert float(-probability.log().mean()) == pytest.approx(told["validation_cross_entropy"], rel=1e-4)
+    gained = before["validation_cross_entropy"] - record["validation_cross_entropy"]
+    assert gained > 0
+    assert before["validation_loss"] - record["validation_loss"] == pytest.approx(gained)
+    assert "temperature" not in before
+
+
+@pytest.mark.parametrize("balance", ["oversample", "undersample", "weights"])
+def test_prior_correction_keeps_probabilities_honest(tmp_path: Path, balance: str) -> None:
+    """On samples of which nothing can be learned but how frequent the commands are."""
+    kind = np.random.default_rng(0).choice(4, 24_000, p=[0.55, 0.3, 0.1, 0.05])
+    dataset = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=600, **{"samples/kind": kind}))
+    means = {}
+    for corrected in ("true", "false"):
+        config = tiny(
+            f"train.balance={balance}",
+            f"train.prior_correction={corrected}",
+            "model.hidden=[1]",
+            "data.batch_size=128",
+            "data.batches_per_epoch=100",
+            "train.learning_rate=0.01",
+            f"train.epochs={25 if balance == 'undersample' else 6}",
+        )
+        run = train(config, dataset, tmp_path / corrected)
+        means[corrected] = run.load_model("last").predict(dataset.state(dataset.split(Split.TRAIN)))[0].mean(0)
+    frequent = torch.from_numpy(kind[dataset.split(Split.TRAIN)]).bincount() / 6000
+    assert (means["true"] / frequent - 1).abs().max() < 0.2
+    assert (means["false"] - 0.25).abs().max() < 0.05
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")

@@ -32,6 +32,16 @@ SETTINGS = (
 )
 
 
+# Relative inputs, of which half are mirrored, rare commands drawn more often, probabilities calibrated.
+REMEDIES = (
+    "model.features=relative",
+    "model.blocks=self,role,ball",
+    "train.balance=oversample",
+    "train.calibrate=true",
+    "data.mirror=0.5",
+)
+
+
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_dataset(tmp_path_factory.mktemp("data") / "ds", frames_per_match=50)
@@ -43,8 +53,8 @@ def torchrun(dataset: Path, out: Path, *options: str) -> subprocess.CompletedPro
     return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
 
 
-def sets() -> list[str]:
-    return [f"--set={setting}" for setting in SETTINGS]
+def sets(*more: str) -> list[str]:
+    return [f"--set={setting}" for setting in (*SETTINGS, *more)]
 
 
 def assert_same_but_for_rounding(one: Run, other: Run) -> None:
@@ -71,6 +81,14 @@ def test_two_processes_train_what_one_trains_and_go_on_with_it(dataset: Path, tm
     train(load_config("small", [*SETTINGS, longer]), open_dataset(dataset), two.path, resume=True)
     assert len(one.history()) == 3
     assert_same_but_for_rounding(two, one)
+
+
+def test_two_processes_agree_on_the_remedies(dataset: Path, tmp_path: Path) -> None:
+    done = torchrun(dataset, tmp_path / "two", *sets(*REMEDIES))
+    assert done.returncode == 0, done.stderr
+    one = train(load_config("small", [*SETTINGS, *REMEDIES]), open_dataset(dataset), tmp_path / "one")
+    assert "temperature" in one.history()[-1]
+    assert_same_but_for_rounding(open_run(tmp_path / "two"), one)
 
 
 def test_a_mistake_ends_all_processes_and_is_told_once(dataset: Path, tmp_path: Path) -> None:

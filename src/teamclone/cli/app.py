@@ -9,6 +9,7 @@ import sys
 import typer
 
 from teamclone.cli import (
+    adapt,
     bench,
     dataset,
     evaluate,
@@ -16,6 +17,7 @@ from teamclone.cli import (
     ingest,
     matches,
     report,
+    search,
     sql,
     train,
     validate,
@@ -29,6 +31,7 @@ EXTRAS = {
     "tensorboard": "train",
     "matplotlib": "report",
     "jinja2": "report",
+    "optuna": "search",
     "distributed": "cluster",
     "adbc_driver_postgresql": "postgresql",
     "adbc_driver_manager": "postgresql",
@@ -51,6 +54,8 @@ for command in (
     sql.sql,
     dataset.dataset,
     train.train,
+    adapt.adapt,
+    search.search,
     evaluate.evaluate,
     report.report,
     bench.bench,

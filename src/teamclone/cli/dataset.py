@@ -14,7 +14,7 @@ def dataset(
     store: Annotated[
         str, typer.Option(help="The store to read: a folder or postgresql://USER:PASSWORD@HOST/DATABASE.")
     ],
-    team: Annotated[str, typer.Option(help="The team to clone, as its logs name it.")],
+    team: Annotated[list[str], typer.Option(help="The team to clone, as its logs name it; repeatable.")],
     out: Annotated[Path, typer.Option(help="The folder to write.")],
     unseen: Annotated[list[str] | None, typer.Option(help="An opponent to keep out of training; repeatable.")] = None,
     split: Annotated[str, typer.Option(help="match: whole matches; rows: the paper's, which leaks.")] = "match",
@@ -36,14 +36,14 @@ def dataset(
     replace: Annotated[bool, typer.Option(help="Put it in the place of a dataset that is already there.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the cleaning report as JSON.")] = False,
 ) -> None:
-    """Clean a store and bind every command of a team to the state it was decided on."""
+    """Clean a store and bind every command of one or more teams to the state it was decided on."""
     from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
     from teamclone.dataset.clean import Commands, TurnZero
     from teamclone.store import open_store
     from teamclone.store.cluster import executor_of
 
     config = DatasetConfig(
-        team=team,
+        teams=tuple(team),
         unseen=tuple(unseen or ()),
         split=choice(SplitBy, split, option="--split"),
         commands=choice(Commands, commands, option="--commands"),
@@ -83,7 +83,10 @@ def _print(report: dict[str, Any], out: Path) -> None:
     print()
     kinds = list(next(iter(report["rows"].values())))
     splits = {split: counts for split, counts in report["rows"].items() if sum(counts.values())}
-    matches_of = {split: sum(match["split"] == split for match in report["matches"]) for split in splits}
+    # Once each, though a match of two of the teams has an entry of either.
+    matches_of = {
+        split: len({match["match_id"] for match in report["matches"] if match["split"] == split}) for split in splits
+    }
     print_table(
         ["split", "matches", *kinds, "rows"],
         [

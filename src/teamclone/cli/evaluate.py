@@ -45,6 +45,7 @@ def evaluate(
 def print_summary(evaluation: dict[str, Any]) -> None:
     """The figures of an evaluation that fit on a screen."""
     from teamclone.evaluation.bootstrap import FEW_MATCHES
+    from teamclone.evaluation.metrics import EVEN_LOG_LOSS
 
     splits = evaluation["splits"]
     print(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
@@ -104,6 +105,17 @@ def print_summary(evaluation: dict[str, Any]) -> None:
             ],
             numeric=range(2, 6),
         )
+        losses = {command: row["parameter_log_loss"] for command, row in split["commands"].items()}
+        if any(loss["value"] is not None for loss in losses.values()):
+            print()
+            print_table(
+                [name, "log loss of its parameters, nats", "even guess"],
+                [
+                    (command, _cell(loss, 2), _number(float(even), 2))
+                    for (command, loss), even in zip(losses.items(), EVEN_LOG_LOSS, strict=True)
+                ],
+                numeric=(1, 2),
+            )
     print()
 
 

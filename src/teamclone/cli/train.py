@@ -15,8 +15,9 @@ from teamclone.errors import TeamcloneError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from teamclone.training.config import Config
     from teamclone.training.loop import Progress
-    from teamclone.training.run import Run
+    from teamclone.training.run import Base, Run
 
 
 def _show_preset(name: str | None) -> None:
@@ -50,21 +51,30 @@ def train(
     # Before PyTorch is imported: a wrong setting is told at once.
     config = load_config(preset or "small", overrides or [])
 
+    if resume and preset is None:
+        from teamclone.training.run import open_run
+
+        config = override(open_run(out).config, overrides or [])
+    run_training(config, dataset, out, resume=resume, as_json=as_json)
+
+
+def run_training(
+    config: Config, dataset: Path, out: Path, *, resume: bool = False, base: Base | None = None, as_json: bool = False
+) -> None:
+    """Train on a terminal: progress, what to do after Ctrl-C, a summary at the end."""
     from teamclone.dataset.reader import open_dataset
     from teamclone.training import loop
     from teamclone.training.group import is_first
     from teamclone.training.run import is_run, open_run
 
-    if resume and preset is None:
-        config = override(open_run(out).config, overrides or [])
     opened = open_dataset(dataset)
     try:
         if not is_first():
-            _in_silence(lambda: loop.train(config, opened, out, resume=resume))
+            _in_silence(lambda: loop.train(config, opened, out, resume=resume, base=base))
             return
-        with progress("train") as bar:
+        with progress("train" if base is None else "adapt") as bar:
             report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines()
-            run = loop.train(config, opened, out, resume=resume, on_progress=report)
+            run = loop.train(config, opened, out, resume=resume, base=base, on_progress=report)
     except KeyboardInterrupt:
         finished = len(open_run(out).history()) if is_run(out) else 0
         again = f"teamclone train {dataset} --out {out} --resume"

@@ -40,7 +40,8 @@ class DatasetConfig:
     """What goes into a dataset.
 
     Attributes:
-        team: the team to clone, as its logs name it.
+        teams: the teams to clone, as their logs name them. Each is seen as attacking +x and coming first, so a match of
+            two of them is in the dataset twice; both entries fall into the same split.
         unseen: opponents kept out of training, validation and test.
         split: see SplitBy.
         commands, turn_zero: see `clean`.
@@ -50,7 +51,7 @@ class DatasetConfig:
         seed: of the split.
     """
 
-    team: str
+    teams: tuple[str, ...]
     unseen: tuple[str, ...] = ()
     split: SplitBy = SplitBy.MATCH
     commands: Commands = Commands.EXECUTED
@@ -61,12 +62,18 @@ class DatasetConfig:
     validation: float = 0.15
     seed: int = 0
 
+    @property
+    def team(self) -> str:
+        """All teams as one name."""
+        return " + ".join(self.teams)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Entry:
     match_id: str
     name: str
     side: int
+    team: str
     opponent: str
 
 
@@ -102,14 +109,14 @@ def build_dataset(
         and rows), ``rows`` by split and kind, ``player_cycles``, ``idle`` and ``frozen``.
 
     Raises:
-        UsageError: the team or an unseen opponent does not occur in the store.
+        UsageError: a team or an unseen opponent does not occur in the store, or a team is named twice.
         StoreError: a match cannot be read, or a worker does not see the store.
         DatasetError: no row is left, or ``out`` cannot be written.
         ClusterError: the connection to the executor's workers was lost.
     """
     entries, without_team = _entries(store, config)
     splits = split_matches(
-        [MatchKey(match_id=entry.match_id, opponent=entry.opponent) for entry in entries],
+        [MatchKey(match_id=entry.match_id, team=entry.team, opponent=entry.opponent) for entry in entries],
         unseen=config.unseen,
         fixed=_fixed(entries, config),
         test=config.test,
@@ -138,7 +145,8 @@ def build_dataset(
                 of_rows, name = np.full(len(kind), split, np.uint8), split.name.lower()
             _add(writer, match, index=len(matches), split=of_rows)
             np.add.at(rows, (of_rows, kind), 1)
-            matches.append(_report_match(task.entry, match, split=name))
+            row = _report_match(task.entry, match, split=name)
+            matches.append(row if len(config.teams) == 1 else {"team": task.entry.team, **row})
             types.append(types_of_match)
             if on_progress is not None:
                 on_progress(len(matches), len(entries))
@@ -150,9 +158,12 @@ def build_dataset(
                 "Matches without a command log have none to give, and before log version 3 nothing tells what was "
                 "executed"
             )
+        options = asdict(config)
+        teams = options.pop("teams")
         meta = {
             "team": config.team,
-            "options": asdict(config),
+            **({"teams": teams} if len(teams) > 1 else {}),
+            "options": {"team": teams if len(teams) > 1 else config.team, **options},
             "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
             "cleaning": report,
         }
@@ -177,30 +188,36 @@ def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:
 
 
 def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
-    """The team's matches by match id, and how many matches are without it."""
+    """The teams' matches by match id, the left side first, and how many matches are without them."""
+    if not config.teams or len(set(config.teams)) < len(config.teams):
+        raise UsageError(f"expected different teams, got {', '.join(config.teams) or 'none'}; name each once")
     entries: list[_Entry] = []
     teams: Counter[str] = Counter()
     rows = store.matches().to_pylist()
     for row in rows:
         left, right = row["left_name"], row["right_name"]
         teams.update(name for name in (left, right) if name)
-        if config.team in (left, right):
-            on_left = config.team == left
+        for side, team, opponent in ((1, left, right), (-1, right, left)):
+            if team not in config.teams or (side < 0 and left == right):
+                continue
             entries.append(
                 _Entry(
                     match_id=row["match_id"],
                     name=row["game_log"] or row["command_log"] or row["match_id"],
-                    side=1 if on_left else -1,
-                    opponent=(right if on_left else left) or "nobody",
+                    side=side,
+                    team=team,
+                    opponent=opponent or "nobody",
                 )
             )
-    if not entries:
-        raise UsageError(f"team {config.team!r} is in no match of the store{_hint(config.team, teams)}")
+    for name in config.teams:
+        if name not in teams:
+            raise UsageError(f"team {name!r} is in no match of the store{_hint(name, teams)}")
     opponents = {entry.opponent for entry in entries}
     for name in config.unseen:
         if name not in opponents:
             raise UsageError(f"unseen opponent {name!r} plays in no match of {config.team}{_hint(name, opponents)}")
-    return sorted(entries, key=lambda entry: entry.match_id), len(rows) - len(entries)
+    without = len(rows) - len({entry.match_id for entry in entries})
+    return sorted(entries, key=lambda entry: entry.match_id), without
 
 
 def _hint(name: str, known: Counter[str] | set[str]) -> str:

@@ -8,24 +8,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def epoch_order(n: int, *, seed: int, epoch: int, slice_rows: int) -> NDArray[np.int64]:
-    """The rows of one epoch, (rows,), each in 0..n-1 and at most once.
+def epoch_order(
+    n: int, *, seed: int, epoch: int, slice_rows: int, draws: NDArray[np.floating] | None = None
+) -> NDArray[np.int64]:
+    """The rows of one epoch, (rows,), each in 0..n-1 and, without ``draws``, at most once.
 
     The paper's slices: all rows are shuffled once and cut into slices; each epoch takes the next slice, round robin,
     and shuffles it again. The slices are as many as ``slice_rows`` asks for at least and of equal length (± 1), so
-    that none is a small rest.
+    that none is a small rest. With ``draws`` each round over the slices begins with drawing its rows anew.
 
     Args:
         n: number of rows.
         seed: of both shuffles.
         epoch: from 0.
         slice_rows: the longest that a slice may be.
+        draws: (n,) how often each row is to come in a round, on average over the rounds; in one round it comes that
+            often rounded down or up. Their sum, rounded, is the number of rows of a round.
     """
-    shuffled = _shuffled(n, seed)
-    slices = max(1, -(-n // slice_rows))
-    index = epoch % slices
-    part = shuffled[index * n // slices : (index + 1) * n // slices]
+    rows = _shuffled(n, seed)
+    total = n if draws is None else max(1, round(float(draws.sum(dtype=np.float64))))
+    slices = max(1, -(-total // slice_rows))
+    turn, index = divmod(epoch, slices)
+    if draws is not None:
+        rows = _drawn(rows, draws[rows], total, offset=np.random.default_rng((seed, 3, turn)).random())
+    part = rows[index * total // slices : (index + 1) * total // slices]
     return np.random.default_rng((seed, 1, epoch)).permutation(part).astype(np.int64)
+
+
+def epoch_mirrored(n: int, *, seed: int, epoch: int, share: float) -> NDArray[np.bool_]:
+    """(n,) which samples of an epoch's order are shown mirrored: each with probability ``share``."""
+    return np.random.default_rng((seed, 4, epoch)).random(n) < share
+
+
+def _drawn(rows: NDArray[np.integer], draws: NDArray[np.floating], total: int, *, offset: float) -> NDArray[np.integer]:
+    """``total`` of the rows: a comb with a tooth at ``offset`` and then at every 1 over their draws laid end to end."""
+    ends = np.cumsum(draws, dtype=np.float64)
+    ends *= total / ends[-1]
+    ends[-1] = total
+    return np.repeat(rows, np.diff(np.floor(ends + offset), prepend=np.floor(offset)).astype(np.int64))
 
 
 @lru_cache(maxsize=1)

@@ -71,7 +71,12 @@ class Baselines:
         """The same rows with a baseline's answers in place of the model's."""
         probabilities = self.table(name)[outcome.last].astype(np.float32)  # -1, none known, is the last row
         parameters = np.broadcast_to(self.parameters.astype(np.float32), outcome.parameters.shape)
-        return replace(outcome, probabilities=probabilities, parameters=parameters)
+        return replace(
+            outcome,
+            probabilities=probabilities,
+            parameters=parameters,
+            parameter_log_loss=np.full(len(outcome), np.nan, np.float32),
+        )
 
 
 @dataclass(slots=True)

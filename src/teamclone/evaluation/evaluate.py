@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -23,13 +22,16 @@ from teamclone.evaluation import bootstrap, metrics
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
 from teamclone.files import write_atomic
+from teamclone.models.heads import PointHead
+from teamclone.models.network import model_id
+from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 
 if TYPE_CHECKING:
     from teamclone.models.network import Clone
     from teamclone.training.run import Run
 
-FORMAT = 1
+FORMAT = 2
 """Of evaluation.json; raised whenever a reader of the old one would misread the new one."""
 
 BATCH = 8192
@@ -52,6 +54,7 @@ def predict(
     dataset: Dataset,
     rows: NDArray[np.int64],
     *,
+    inputs: torch.Tensor | None = None,
     batch: int = BATCH,
     on_batch: Callable[[int], None] | None = None,
 ) -> Outcome:
@@ -61,6 +64,7 @@ def predict(
         model: a clone; it is put into evaluation mode.
         dataset: where the samples lie.
         rows: (n,) indices of samples.
+        inputs: (n, columns) what the features project from these samples, for who has it already; None makes it.
         batch: samples per pass.
         on_batch: called with the number of samples just done.
     """
@@ -72,8 +76,15 @@ def predict(
         for start in range(0, n, batch):
             part = rows[start : start + batch]
             stop = start + len(part)
-            state = dataset.state(part, history=model.inputs.history)
-            answer = model(state.to(device))
+            if inputs is None:
+                output = model.output(dataset.state(part, history=model.inputs.history).to(device))
+            else:
+                output = model.answer(model.inputs.normalise(inputs[start:stop].to(device)))
+            answer = model.head.point(output)
+            if model.config.head == "mixture" and not isinstance(model.head, PointHead):
+                target = Target(*(tensor.to(device) for tensor in dataset.target(part)))
+                likelihood = model.head.log_likelihood(output, target)
+                outcome.parameter_log_loss[start:stop] = -likelihood.float().cpu().numpy()
             kind, issued, last = truth(dataset, part)
             outcome.probabilities[start:stop] = answer.logits.float().softmax(1).cpu().numpy()
             outcome.parameters[start:stop] = answer.parameters.float().cpu().numpy()
@@ -81,7 +92,8 @@ def predict(
             outcome.issued[start:stop] = issued
             outcome.last[start:stop] = last
             outcome.match[start:stop] = dataset.match(part).numpy()
-            outcome.position[start:stop] = state.players[torch.arange(len(part)), state.actor, :2].numpy()
+            frame, actor = dataset.samples["frame"].numpy()[part], dataset.samples["player"].numpy()[part]
+            outcome.position[start:stop] = dataset.frames["position"].numpy()[frame, actor]
             if on_batch is not None:
                 on_batch(len(part))
     return outcome
@@ -91,6 +103,7 @@ def _empty(n: int) -> Outcome:
     return Outcome(
         probabilities=np.empty((n, len(KINDS)), np.float32),
         parameters=np.empty((n, len(PARAMETERS)), np.float32),
+        parameter_log_loss=np.full(n, np.nan, np.float32),
         kind=np.empty(n, np.int64),
         issued=np.empty((n, len(PARAMETERS)), np.float32),
         last=np.empty(n, np.int64),
@@ -125,15 +138,6 @@ def count_training(dataset: Dataset, *, on_batch: Callable[[int], None] | None =
     return counter.finish()
 
 
-def model_id(model: Clone) -> str:
-    """A hash of the weights: whether numbers belong to this very model."""
-    digest = hashlib.blake2b(digest_size=8)
-    for name, tensor in sorted(model.state_dict().items()):
-        digest.update(name.encode())
-        digest.update(tensor.detach().cpu().contiguous().reshape(-1).view(torch.uint8).numpy().tobytes())
-    return digest.hexdigest()
-
-
 def evaluate(
     run: Run,
     *,
@@ -147,7 +151,7 @@ def evaluate(
     Args:
         run: a finished or interrupted training run.
         dataset: another dataset than the run's own: all its splits are evaluated, and matches that the run was trained
-            on are named.
+            on are named, as are those of the run that it was adapted from.
         checkpoint: which weights.
         seed: of the bootstrap and of the sample of positions.
         on_progress: called with rows done and rows in all.
@@ -182,6 +186,9 @@ def evaluate(
 
     counted = count_training(trained_on, on_batch=on_batch)
     known = {match["match_id"] for match in _used(trained_on, Split.TRAIN)} if foreign and own is not None else set()
+    of_base = set((run.environment.get("base") or {}).get("trained_on") or ())
+    evaluated = {match["match_id"] for split in rows for match in _used(data, split)}
+    known |= of_base & evaluated
     trained_numbers = _players(trained_on, trained_on.split(Split.TRAIN))
     sections = {}
     for split, index in rows.items():
@@ -198,14 +205,16 @@ def evaluate(
             "checkpoint": checkpoint,
             "model_id": model_id(model),
             "weights": sum(weights.numel() for weights in model.parameters()),
+            "base": run.environment.get("base"),
         },
         "dataset": {
             "path": str(data.path),
             "id": data.id,
             "team": data.meta["team"],
+            "teams": data.meta.get("teams", [data.meta["team"]]),
             "own": not foreign,
             "baselines_counted_on": str(trained_on.path),
-            "trained_on_before": sorted(match["match_id"] for match in data.matches if match["match_id"] in known),
+            "trained_on_before": sorted({match["match_id"] for match in data.matches} & known),
             "matches": data.matches,
             "cleaning": _without_matches(data.meta.get("cleaning")),
             "options": data.meta.get("options"),
@@ -293,19 +302,24 @@ def describe(
     Args:
         outcome: the split.
         baselines: counts of the training split.
-        matches: what is known of each match, indexed by ``outcome.match``; ``opponent`` is read.
+        matches: what is known of each match, indexed by ``outcome.match``; ``match_id`` and ``opponent`` are read. The
+            two entries of a match in which both teams are modelled count as one.
         seed: of the bootstrap.
     """
-    used, sums = metrics.measure(outcome)
+    used, by_entry = metrics.measure(outcome)
+    sums, entries = _by_match(by_entry, used, matches)
     total = sums.total()
-    several = len(used) > 1
-    occurrences = bootstrap.draw(len(used), seed=seed) if several else None
+    several = len(entries) > 1
+    occurrences = bootstrap.draw(len(entries), seed=seed) if several else None
     resampled = bootstrap.resample(sums, occurrences) if occurrences is not None else None
     point = metrics.scores(total)
     spread = metrics.scores(resampled) if resampled is not None else None
     section: dict[str, Any] = {
         "rows": len(outcome),
-        "matches": [_match(matches[index], sums.select(np.array([place]))) for place, index in enumerate(used)],
+        "matches": [
+            _match([matches[index] for index in of_match], sums.select(np.array([place])))
+            for place, of_match in enumerate(entries)
+        ],
         "model": _scores(point, spread),
         "confusion": total.confusion.astype(int).tolist(),
         "commands": _commands(total, resampled),
@@ -315,11 +329,11 @@ def describe(
             "commands": {name: _curve(metrics.command_curve(outcome, kind)) for kind, name in enumerate(KINDS)},
         },
         "baselines": {},
-        "opponents": _opponents(used, sums, matches, seed=seed),
+        "opponents": _opponents(used, by_entry, matches, seed=seed),
     }
     for name in rules.NAMES:
         answer = baselines.answer(name, outcome)
-        _, other = metrics.measure(answer)
+        other, _ = _by_match(metrics.measure(answer)[1], used, matches)
         other_point = metrics.scores(other.total())
         other_spread = metrics.scores(bootstrap.resample(other, occurrences)) if occurrences is not None else None
         gain, skill = _gain(point, other_point)
@@ -349,11 +363,24 @@ def _gain(model: Scores, other: Scores) -> tuple[Any, Any]:
     return model.accuracy - other.accuracy, 1.0 - metrics.ratio(model.cross_entropy, other.cross_entropy)
 
 
-def _match(match: dict[str, Any], sums: Sums) -> dict[str, Any]:
+def _by_match(sums: Sums, used: NDArray[np.int64], matches: Sequence[dict[str, Any]]) -> tuple[Sums, list[list[int]]]:
+    """Sums of entries, those indexed by ``used``, as sums of matches, and the entries of each.
+
+    Two entries of one match, each of another team, are the same game: no independent draws.
+    """
+    places: dict[str, list[int]] = {}
+    for place, index in enumerate(used):
+        places.setdefault(matches[index]["match_id"], []).append(place)
+    grouped = [sums.select(np.array(of_match)).total() for of_match in places.values()]
+    joined = Sums(*map(np.stack, zip(*grouped, strict=True))) if grouped else sums
+    return joined, [[int(used[place]) for place in of_match] for of_match in places.values()]
+
+
+def _match(entries: Sequence[dict[str, Any]], sums: Sums) -> dict[str, Any]:
     point = metrics.scores(sums.total())
     return {
-        "match_id": match["match_id"],
-        "opponent": match["opponent"],
+        "match_id": entries[0]["match_id"],
+        "opponent": " and ".join(entry["opponent"] for entry in entries),
         "rows": int(sums.confusion.sum()),
         "accuracy": number(point.accuracy),
         "cross_entropy": number(point.cross_entropy),
@@ -363,6 +390,10 @@ def _match(match: dict[str, Any], sums: Sums) -> dict[str, Any]:
 def _commands(total: Sums, resampled: Sums | None) -> dict[str, Any]:
     point = metrics.rates(total.confusion)
     spread = metrics.rates(resampled.confusion) if resampled is not None else None
+    losses = metrics.ratio(total.parameter_log_loss, total.likelihood_count)
+    loss_spread = (
+        metrics.ratio(resampled.parameter_log_loss, resampled.likelihood_count) if resampled is not None else None
+    )
     counts = ("support", "predicted")
     table: dict[str, Any] = {}
     for kind, name in enumerate(KINDS):
@@ -371,6 +402,7 @@ def _commands(total: Sums, resampled: Sums | None) -> dict[str, Any]:
             if field not in counts:
                 values = None if spread is None else getattr(spread, field)[:, kind]
                 row[field] = _value(getattr(point, field)[kind], values)
+        row["parameter_log_loss"] = _value(losses[kind], None if loss_spread is None else loss_spread[:, kind])
         table[name] = row
     return table
 
@@ -451,7 +483,7 @@ def characterise(dataset: Dataset, *, seed: int = 0) -> dict[str, Any]:
         places[name] = np.round(spots.astype(np.float64), 1).tolist()
     return {
         "rows": len(dataset),
-        "matches": len(dataset.matches),
+        "matches": len({match["match_id"] for match in dataset.matches}),
         "commands_by_split": {
             split.name.lower(): dict(zip(KINDS, by_split[split].tolist(), strict=True)) for split in Split
         },

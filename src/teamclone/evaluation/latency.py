@@ -15,7 +15,8 @@ import torch
 import teamclone
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
-from teamclone.evaluation.evaluate import model_id, read_document
+from teamclone.evaluation.evaluate import read_document
+from teamclone.models.network import model_id
 from teamclone.models.state import State
 
 if TYPE_CHECKING:

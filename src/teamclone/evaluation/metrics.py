@@ -7,6 +7,7 @@ a thousand bootstrap resamples at once (`evaluation.bootstrap`).
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,13 @@ N_PARAMETERS = len(PARAMETERS)
 CALIBRATION_BINS = 15
 LIMITS: Floats = np.array([parameter.limit for parameter in PARAMETERS])
 IS_ANGLE: NDArray[np.bool_] = np.array([parameter.angle for parameter in PARAMETERS])
+EVEN_LOG_LOSS: Floats = np.array(
+    [
+        sum(math.log(2 * item.limit if item.angle else item.limit) for item in PARAMETERS if item.kind is kind)
+        for kind in CLONED_KINDS
+    ]
+)
+"""(4,) what an even guess over the whole range of a command's parameters has as `Outcome.parameter_log_loss`."""
 
 
 class Sums(NamedTuple):
@@ -38,6 +46,8 @@ class Sums(NamedTuple):
         bin_hits: (..., bins) those predicted right.
         parameter_count: (..., 6) commands that carried the parameter.
         parameter_error: (..., 6) their summed absolute error in power and circular degrees.
+        likelihood_count: (..., 4) rows of each command given whose parameters got a likelihood.
+        parameter_log_loss: (..., 4) their summed -ln likelihood, nats.
         paper_error: (...) sum over rows of the mean over all six outputs, as the paper took it.
     """
 
@@ -49,6 +59,8 @@ class Sums(NamedTuple):
     bin_hits: Floats
     parameter_count: Floats
     parameter_error: Floats
+    likelihood_count: Floats
+    parameter_log_loss: Floats
     paper_error: Floats
 
     def select(self, matches: NDArray[np.integer] | NDArray[np.bool_]) -> Sums:
@@ -128,6 +140,7 @@ def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, S
     cell = code * n_bins + np.searchsorted(edges, confidence, side="right")
     error = parameter_errors(outcome.parameters, outcome.issued)
     known = np.isfinite(outcome.issued)
+    likely = np.isfinite(outcome.parameter_log_loss)
 
     def by_match(values: NDArray[np.generic]) -> Floats:
         return np.bincount(code, weights=values.astype(np.float64), minlength=n_matches).astype(np.float64)
@@ -135,6 +148,10 @@ def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, S
     def by_bin(values: NDArray[np.generic]) -> Floats:
         sums = np.bincount(cell, weights=values.astype(np.float64), minlength=n_matches * n_bins)
         return sums.astype(np.float64).reshape(n_matches, n_bins)
+
+    def by_kind(values: NDArray[np.generic]) -> Floats:
+        sums = np.bincount(code * N_KINDS + outcome.kind, weights=values, minlength=n_matches * N_KINDS)
+        return sums.astype(np.float64).reshape(n_matches, N_KINDS)
 
     square = (code * N_KINDS + outcome.kind) * N_KINDS + predicted
     confusion = np.bincount(square, minlength=n_matches * N_KINDS**2).reshape(n_matches, N_KINDS, N_KINDS)
@@ -147,6 +164,8 @@ def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, S
         bin_hits=by_bin(predicted == outcome.kind),
         parameter_count=np.stack([by_match(column) for column in known.T], axis=1),
         parameter_error=np.stack([by_match(column) for column in np.where(known, error, 0.0).T], axis=1),
+        likelihood_count=by_kind(likely),
+        parameter_log_loss=by_kind(np.where(likely, outcome.parameter_log_loss, 0.0)),
         paper_error=by_match(paper_errors(outcome.parameters, outcome.issued)),
     )
     return matches.astype(np.int64), sums

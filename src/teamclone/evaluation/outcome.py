@@ -15,6 +15,8 @@ class Outcome:
     Attributes:
         probabilities: (n, 4) over CLONED_KINDS.
         parameters: (n, 6) predicted PARAMETERS, in power and degrees.
+        parameter_log_loss: (n,) -ln of the likelihood of the given command's parameters, nats, per unit of power and
+            degree; NaN from what answers with points.
         kind: (n,) the command given, index into CLONED_KINDS.
         issued: (n, 6) PARAMETERS of the command given, in power and degrees; NaN for those of other commands.
         last: (n,) the player's last executed command as an index into CLONED_KINDS; -1 for none of them.
@@ -24,6 +26,7 @@ class Outcome:
 
     probabilities: NDArray[np.float32]
     parameters: NDArray[np.float32]
+    parameter_log_loss: NDArray[np.float32]
     kind: NDArray[np.int64]
     issued: NDArray[np.float32]
     last: NDArray[np.int64]

@@ -13,12 +13,13 @@ from markupsafe import Markup
 
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import RunError
-from teamclone.evaluation import bootstrap, figures, paper
-from teamclone.evaluation.evaluate import evaluate, load_evaluation, model_id, save_evaluation, write_json
+from teamclone.evaluation import bootstrap, figures, metrics, paper
+from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evaluation, write_json
 from teamclone.evaluation.latency import load_bench, measure_latency
 from teamclone.files import write_atomic
+from teamclone.models.network import model_id
 from teamclone.rcss.commands import CLONED_KINDS
-from teamclone.training.config import to_toml
+from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
 
 KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
@@ -186,18 +187,20 @@ def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
     """The commands that lead from match logs to this report; what the record does not know stands in capitals."""
     data, run = evaluation["dataset"], evaluation["run"]
     options = data["options"] or {}
-    build = ["teamclone dataset --store STORE", f"--team {shlex.quote(data['team'])}"]
+    build = ["teamclone dataset --store STORE", *(f"--team {shlex.quote(team)}" for team in data["teams"])]
     for key, value in options.items():
         if key == "team" or value is None or value == []:
             continue
         name = {"test_matches": "test-match", "validation_matches": "validation-match"}.get(key, key.replace("_", "-"))
         build += [f"--{name} {shlex.quote(str(item))}" for item in (value if isinstance(value, list) else [value])]
+    source, base = shlex.quote(str(trained_on)), run["base"]
+    learn = f"adapt {shlex.quote(base['path'])} {source}" if base else f"train {source}"
     other = "" if data["own"] else f" --data {shlex.quote(data['path'])}"
     path = shlex.quote(run["path"])
     return [
         "teamclone ingest MATCHES --store STORE",
         _wrapped([*build, f"--out {shlex.quote(data['path'])}"]),
-        f"teamclone train {shlex.quote(str(trained_on))} --out {path}  # with the settings below",
+        f"teamclone {learn} --out {path}  # with the settings below",
         f"teamclone evaluate {path}{other} --checkpoint {run['checkpoint']}",
         f"teamclone bench {path}",
         f"teamclone report {path}",
@@ -272,6 +275,14 @@ def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
         return bench if bench["model_id"] == model_id(run.load_model(checkpoint)) else None
     except (RunError, KeyError):
         return None
+
+
+def trained_error(config: Config) -> str:
+    """What a run took as the error of parameters, in words."""
+    if config.model.head == "mixture":
+        return "negative log-likelihood, nats"
+    where = "all six outputs" if config.train.parameter_loss == "paper" else "those issued"
+    return f"mean square over {where}"
 
 
 def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, history: Sequence[Any]) -> dict[str, Markup]:
@@ -364,6 +375,7 @@ def render(
         figures=FIGURES,
         percents=PERCENT,
         kinds=KINDS,
+        even_log_loss=dict(zip(KINDS, map(float, metrics.EVEN_LOG_LOSS), strict=True)),
         support=support,
         sentences=sentences(evaluation),
         ladder=ladder(evaluation),
@@ -374,6 +386,7 @@ def render(
         commands=commands(evaluation, trained_on=run.dataset_path),
         paper=paper,
         plots=_plots(evaluation, bench, history),
+        trained_error=trained_error(run.config),
         settings=to_toml(run.config),
         versions={**run.environment, **evaluation["versions"]},
         listing=listing,

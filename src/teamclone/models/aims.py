@@ -54,6 +54,8 @@ class Aims(nn.Module):
     def __init__(self, width: int, count: int, hidden: Sequence[int], activation: type[nn.Module]) -> None:
         super().__init__()
         self.count = count
+        if not count:
+            return
         self.body = layers((width, *hidden), activation)
         self.place = nn.Linear((width, *hidden)[-1], 2 * count)
         self.register_buffer(
@@ -68,10 +70,11 @@ class Aims(nn.Module):
 
         Returns:
             (batch, COLUMNS * count) inputs; (batch, count) radians from the body to the place, from where the player
-            comes to rest; (batch, count) dash power that brings him there as fast as he then would roll on.
+            comes to rest; (batch, count) dash power after which he rolls as far as from there to the place. So agents
+            of the league reckon, though it counts what he rolls already twice.
         """
         if not self.count:
-            nothing = context.new_zeros(len(context), 0)
+            nothing = context.new_zeros(context.shape[0], 0)
             return nothing, nothing, nothing
         hidden = self.body(context).float()
         # In single precision: in bfloat16 a place would be known to a quarter of a metre.

@@ -31,6 +31,7 @@ class ModelConfig:
         activation: see `ACTIVATIONS`.
         dropout: share of the hidden units left out at random in training.
         head: see `HEADS`; mixture needs the relative inputs.
+        members: networks that learn side by side over the same inputs and answer together.
     """
 
     features: str = "paper"
@@ -45,3 +46,4 @@ class ModelConfig:
     activation: str = "relu"
     dropout: float = 0.0
     head: str = "point"
+    members: int = 1

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from teamclone.models import mixture
 from teamclone.models.aims import geometry_of
-from teamclone.models.loss import LIMITS, Loss, ParameterLoss, mixture_loss, point_loss
+from teamclone.models.loss import LIMITS, Balance, Loss, ParameterLoss, mixture_loss, point_loss
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
 from teamclone.models.relative import GEOMETRY, MATES
 from teamclone.models.state import Target
@@ -56,25 +58,46 @@ class Situation(NamedTuple):
 
 
 class PointHead(nn.Module):
-    """The paper's two heads: a softmax over four commands, six parameters bounded by tanh."""
+    """The paper's two heads: a softmax over four commands, six parameters bounded by tanh.
+
+    Attributes:
+        temperature: () what the logits are divided by in an answer, not in training; see `training.calibration`.
+    """
 
     limits: Tensor
+    temperature: Tensor
 
     def __init__(self, width: int) -> None:
         super().__init__()
         self.command = nn.Linear(width, len(CLONED_KINDS))
         self.parameter = nn.Linear(width, len(PARAMETERS))
         self.register_buffer("limits", LIMITS.clone(), persistent=False)
+        self.register_buffer("temperature", torch.ones(()))
 
-    def forward(self, hidden: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, seen: Tensor | Situation) -> tuple[Tensor, Tensor]:
         """Logits (batch, 4) and parameters in [-1, 1], (batch, 6)."""
+        hidden = seen.hidden if isinstance(seen, Situation) else seen
         # Out of autocast's bfloat16: a degree is 1/180, finer than its steps near 1.
         return self.command(hidden).float(), torch.tanh(self.parameter(hidden).float())
+
+    @staticmethod
+    def merged(outputs: Sequence[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
+        """The answers of several heads as one: mean probabilities, of each parameter the one nearest to all."""
+        logits, projected = zip(*outputs, strict=True)
+        values = torch.stack(projected, 2) * math.pi
+        even = torch.zeros_like(values[:, 0])
+        chosen = [mixture.middle(even, values[:, i], angle=of.angle) for i, of in enumerate(PARAMETERS)]
+        return mean_logits(logits), torch.stack(chosen, 1) / math.pi
+
+    @staticmethod
+    def logits(output: tuple[Tensor, Tensor]) -> Tensor:
+        """(batch, 4) as they are trained, before the temperature."""
+        return output[0]
 
     def point(self, output: tuple[Tensor, Tensor]) -> Prediction:
         """The single best answer, in power and degrees."""
         logits, projected = output
-        return Prediction(logits, projected * self.limits)
+        return Prediction(logits / self.temperature, projected * self.limits)
 
     def loss(
         self,
@@ -83,10 +106,13 @@ class PointHead(nn.Module):
         *,
         parameter_loss: ParameterLoss = "paper",
         weight: float = 1.0,
+        balance: Balance | None = None,
         whole: Tensor | None = None,
     ) -> Loss:
         logits, projected = output
-        return point_loss(logits, projected, target, parameter_loss=parameter_loss, weight=weight, whole=whole)
+        return point_loss(
+            logits, projected, target, parameter_loss=parameter_loss, weight=weight, balance=balance, whole=whole
+        )
 
 
 class Distribution(NamedTuple):
@@ -119,9 +145,13 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. kick_width: of what a kick is. aims: places of `aims.Aims`.
+
+    Attributes:
+        temperature: as of `PointHead`; of the commands only.
     """
 
     goal: Tensor
+    temperature: Tensor
 
     def __init__(self, width: int, kick_width: int, aims: int) -> None:
         super().__init__()
@@ -134,6 +164,7 @@ class MixtureHead(nn.Module):
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
+        self.register_buffer("temperature", torch.ones(()))
 
     def forward(self, situation: Situation) -> Distribution:
         hidden, kick = situation.hidden, situation.kick
@@ -194,6 +225,26 @@ class MixtureHead(nn.Module):
             Mixture(logits, angle, mixture.scale_of(angle_scale, least=LEAST_ANGLE, typical=6 * DEGREE)),
         )
 
+    @staticmethod
+    def merged(outputs: Sequence[Distribution]) -> Distribution:
+        """The answers of several heads as one: mean probabilities, and mixtures of all their components."""
+        first = outputs[0]
+        return Distribution(
+            logits=mean_logits([output.logits for output in outputs]),
+            dash_power=mixture.merged([output.dash_power for output in outputs]),
+            dash_direction=mean_logits([output.dash_direction for output in outputs]),
+            turn=mixture.merged([output.turn for output in outputs]),
+            turn_factor=first.turn_factor,
+            kick_power=mixture.merged([output.kick_power for output in outputs]),
+            kick_direction=mixture.merged([output.kick_direction for output in outputs]),
+            tackle_direction=mean_logits([output.tackle_direction for output in outputs]),
+        )
+
+    @staticmethod
+    def logits(output: Distribution) -> Tensor:
+        """(batch, 4) as they are trained, before the temperature."""
+        return output.logits
+
     def point(self, output: Distribution) -> Prediction:
         """The single best answer, in power and degrees: of each mixture the component nearest to its median."""
         turn = mixture.middle(output.turn.logits, output.turn.centre, angle=True) / DEGREE * output.turn_factor
@@ -205,7 +256,7 @@ class MixtureHead(nn.Module):
             mixture.middle(output.kick_direction.logits, output.kick_direction.centre, angle=True) / DEGREE,
             direction_of(output.tackle_direction),
         ]
-        return Prediction(output.logits, torch.stack(parameters, 1))
+        return Prediction(output.logits / self.temperature, torch.stack(parameters, 1))
 
     def loss(
         self,
@@ -214,10 +265,18 @@ class MixtureHead(nn.Module):
         *,
         parameter_loss: ParameterLoss = "paper",
         weight: float = 1.0,
+        balance: Balance | None = None,
         whole: Tensor | None = None,
     ) -> Loss:
         """Negative log-likelihood of command and parameters together; ``parameter_loss`` does not apply."""
-        return mixture_loss(output.logits, self.log_likelihood(output, target), target, weight=weight, whole=whole)
+        return mixture_loss(
+            output.logits,
+            self.log_likelihood(output, target),
+            target,
+            weight=weight,
+            balance=balance,
+            whole=whole,
+        )
 
     @staticmethod
     def log_likelihood(output: Distribution, target: Target) -> Tensor:
@@ -234,6 +293,60 @@ class MixtureHead(nn.Module):
             log_class(output.tackle_direction, first),
         ]
         return torch.stack(by_kind, 1).gather(1, target.kind[:, None]).squeeze(1)
+
+
+class EnsembleHead(nn.Module):
+    """Heads of several trunks, which learn side by side and answer together.
+
+    What it answers to a situation is the list of its members' answers; `merged` makes one of them.
+
+    Attributes:
+        temperature: as of `PointHead`, of the merged logits; the members keep 1.
+    """
+
+    temperature: Tensor
+
+    def __init__(self, members: Sequence[PointHead | MixtureHead]) -> None:
+        super().__init__()
+        self.members = nn.ModuleList(members)
+        self.register_buffer("temperature", torch.ones(()))
+
+    @property
+    def _first(self) -> Any:
+        return self.members[0]
+
+    def forward(self, seen: Sequence[Any]) -> list[Any]:
+        return [member(of) for member, of in zip(self.members, seen, strict=True)]
+
+    def merged(self, outputs: Sequence[Any]) -> Any:
+        return self._first.merged(outputs)
+
+    def logits(self, outputs: Sequence[Any]) -> Tensor:
+        """(batch, 4) of the mean probabilities, before the temperature."""
+        logits: Tensor = self._first.logits(self.merged(outputs))
+        return logits
+
+    def point(self, outputs: Sequence[Any]) -> Prediction:
+        prediction: Prediction = self._first.point(self.merged(outputs))
+        return prediction._replace(logits=prediction.logits / self.temperature)
+
+    def log_likelihood(self, outputs: Sequence[Any], target: Target) -> Tensor:
+        """As of `MixtureHead`, which its members have to be."""
+        likelihood: Tensor = self._first.log_likelihood(self.merged(outputs), target)
+        return likelihood
+
+    def loss(self, outputs: Sequence[Any], target: Target, **settings: Any) -> Loss:
+        """In training the mean of the members' errors, so that each learns as if alone; else that of their answer."""
+        if not self.training:
+            loss: Loss = self._first.loss(self.merged(outputs), target, **settings)
+            return loss
+        losses = [self._first.loss(output, target, **settings) for output in outputs]
+        return Loss(*(torch.stack(part).mean() for part in zip(*losses, strict=True)))
+
+
+def mean_logits(logits: Sequence[Tensor]) -> Tensor:
+    """(batch, classes) logarithms of the mean probabilities."""
+    return torch.stack([torch.log_softmax(of, 1) for of in logits]).logsumexp(0) - math.log(len(logits))
 
 
 def class_of(degrees: Tensor, count: int) -> Tensor:

@@ -20,6 +20,20 @@ _ARGUMENT = torch.tensor([parameter.argument for parameter in PARAMETERS])
 _KIND = torch.tensor([CLONED_KINDS.index(parameter.kind) for parameter in PARAMETERS])
 
 
+class Balance(NamedTuple):
+    """How the cross-entropy makes up for commands of unlike frequency.
+
+    Attributes:
+        weight: (4,) over CLONED_KINDS, of a command's cross-entropy.
+        shift: (4,) added to the logits before it. With the logarithm of how much more often training sees a command
+            than the world does, the logits themselves come out as those of the world: prior correction (King and Zeng
+            2001), logit adjustment (Menon et al. 2021).
+    """
+
+    weight: Tensor
+    shift: Tensor
+
+
 class Loss(NamedTuple):
     """The training error and its two parts, scalars: ``total = cross_entropy + weight * parameters``."""
 
@@ -46,6 +60,13 @@ def projected_parameters(target: Target) -> Tensor:
     return torch.where(issued(target.kind), values, 0.0)
 
 
+def command_loss(logits: Tensor, kind: Tensor, *, balance: Balance | None = None, of: int) -> Tensor:
+    """Cross-entropy of the command, summed over the samples and divided by ``of``; ``kind`` is (batch,)."""
+    if balance is None:
+        return functional.cross_entropy(logits, kind, reduction="sum") / of
+    return functional.cross_entropy(logits + balance.shift, kind, weight=balance.weight, reduction="sum") / of
+
+
 def point_loss(
     logits: Tensor,
     projected: Tensor,
@@ -53,6 +74,7 @@ def point_loss(
     *,
     parameter_loss: ParameterLoss = "paper",
     weight: float = 1.0,
+    balance: Balance | None = None,
     whole: Tensor | None = None,
 ) -> Loss:
     """Cross-entropy plus mean squared error, in the paper unweighted (section II-B).
@@ -64,11 +86,12 @@ def point_loss(
         parameter_loss: "paper" takes the error over all six outputs, whose target is zero where the parameter was not
             issued; "masked" only over the issued ones.
         weight: of the squared error.
+        balance: of the commands; None where they count alike.
         whole: (n,) commands of the batch of which these samples are a share: the means are taken over it, so that the
             losses of all shares add up to that of the batch. None where they are the batch.
     """
     whole = target.kind if whole is None else whole
-    cross_entropy = functional.cross_entropy(logits, target.kind, reduction="sum") / len(whole)
+    cross_entropy = command_loss(logits, target.kind, balance=balance, of=len(whole))
     squared = (projected - projected_parameters(target)).square()
     if parameter_loss == "masked":
         mse = (squared * issued(target.kind)).sum() / issued(whole).sum()
@@ -78,14 +101,21 @@ def point_loss(
 
 
 def mixture_loss(
-    logits: Tensor, log_likelihood: Tensor, target: Target, *, weight: float = 1.0, whole: Tensor | None = None
+    logits: Tensor,
+    log_likelihood: Tensor,
+    target: Target,
+    *,
+    weight: float = 1.0,
+    balance: Balance | None = None,
+    whole: Tensor | None = None,
 ) -> Loss:
     """Mean negative log-likelihood of the command and, given the command, of its parameters.
 
     Args:
-        logits: (batch, 4). log_likelihood: (batch,) of the parameters. target, weight, whole: as of `point_loss`.
+        logits: (batch, 4). log_likelihood: (batch,) of the parameters. target, weight, balance, whole: as of
+            `point_loss`.
     """
     n = len(target.kind if whole is None else whole)
-    cross_entropy = functional.cross_entropy(logits, target.kind, reduction="sum") / n
+    cross_entropy = command_loss(logits, target.kind, balance=balance, of=n)
     parameters = -log_likelihood.sum() / n
     return Loss(cross_entropy + weight * parameters, cross_entropy, parameters)

@@ -8,6 +8,7 @@ All densities are per unit of power or per degree of the command's argument.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -95,6 +96,12 @@ def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None
 def log_likelihood(logits: Tensor, terms: Tensor) -> Tensor:
     """(batch,) of the mixture, from what each component gives."""
     return torch.logsumexp(torch.log_softmax(logits, 1) + terms, 1)
+
+
+def merged(parts: Sequence[Mixture]) -> Mixture:
+    """One mixture of the components of several, each with its share divided by their number."""
+    shares = [part._replace(logits=torch.log_softmax(part.logits, 1)) for part in parts]
+    return Mixture(*(torch.cat(columns, 1) for columns in zip(*shares, strict=True)))
 
 
 def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
 from typing import Any, cast
 
 import torch
@@ -10,7 +12,7 @@ from torch import Tensor, nn
 from teamclone.models.aims import COLUMNS, Aims, layers
 from teamclone.models.config import ModelConfig
 from teamclone.models.features import Features, PaperFeatures
-from teamclone.models.heads import MixtureHead, PointHead, Prediction, Situation
+from teamclone.models.heads import EnsembleHead, MixtureHead, PointHead, Prediction, Situation
 from teamclone.models.relative import RelativeFeatures
 from teamclone.models.state import State
 
@@ -46,27 +48,35 @@ class AimedTrunk(nn.Module):
         return Situation(hidden, self.kick(columns.index_select(1, self.kick_columns)), geometry, bearing, power)
 
 
+class Trunks(nn.Module):
+    """The trunks of an ensemble's members over the same inputs."""
+
+    def __init__(self, members: Sequence[nn.Module]) -> None:
+        super().__init__()
+        self.members = nn.ModuleList(members)
+
+    def forward(self, inputs: Tensor) -> list[Any]:
+        return [member(inputs) for member in self.members]
+
+
 class Clone(nn.Module):
     """A network that plays like a team: which command a player gives in a situation, and with which parameters."""
 
     features: PaperFeatures | RelativeFeatures
-    trunk: nn.Sequential | AimedTrunk
-    head: PointHead | MixtureHead
+    trunk: nn.Sequential | AimedTrunk | Trunks
+    head: PointHead | MixtureHead | EnsembleHead
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
         if config.features == "paper":
             self.features = PaperFeatures(own_type=config.own_type, all_types=config.all_types)
-            widths = (len(self.features.names), *config.hidden)
-            self.trunk = layers(widths, _ACTIVATIONS[config.activation], config.dropout)
         else:
             self.features = RelativeFeatures(tuple({*config.blocks, *config.kick_blocks}))
-            self.trunk = AimedTrunk(config, self.features)
-        if config.head == "mixture":
-            self.head = MixtureHead(config.hidden[-1], config.kick_hidden[-1], config.aims)
-        else:
-            self.head = PointHead(config.hidden[-1])
+        trunks = [_trunk(config, self.features) for _ in range(config.members)]
+        heads = [_head(config) for _ in range(config.members)]
+        self.trunk = trunks[0] if config.members == 1 else Trunks(trunks)
+        self.head = heads[0] if config.members == 1 else EnsembleHead(heads)
         for module in self.modules():
             if isinstance(module, nn.Linear):
                 # Keras' default, with which the paper trained.
@@ -83,10 +93,7 @@ class Clone(nn.Module):
 
     def answer(self, inputs: Tensor) -> Any:
         """The same from what the features make of a state, (batch, columns)."""
-        seen = self.trunk(inputs)
-        if isinstance(seen, Situation) and isinstance(self.head, PointHead):
-            seen = seen.hidden
-        return self.head(seen)
+        return self.head(self.trunk(inputs))
 
     def forward(self, state: State) -> Prediction:
         return self.head.point(self.output(state))
@@ -98,6 +105,27 @@ class Clone(nn.Module):
         return prediction.logits.softmax(1), prediction.parameters
 
 
+def _trunk(config: ModelConfig, features: PaperFeatures | RelativeFeatures) -> nn.Sequential | AimedTrunk:
+    if isinstance(features, RelativeFeatures):
+        return AimedTrunk(config, features)
+    return layers((len(features.names), *config.hidden), _ACTIVATIONS[config.activation], config.dropout)
+
+
+def _head(config: ModelConfig) -> PointHead | MixtureHead:
+    if config.head == "mixture":
+        return MixtureHead(config.hidden[-1], config.kick_hidden[-1], config.aims)
+    return PointHead(config.hidden[-1])
+
+
 def parameter_count(model: nn.Module) -> int:
     """Number of trained weights."""
     return sum(weights.numel() for weights in model.parameters())
+
+
+def model_id(model: nn.Module) -> str:
+    """A hash of the weights: whether numbers belong to this very model."""
+    digest = hashlib.blake2b(digest_size=8)
+    for name, tensor in sorted(model.state_dict().items()):
+        digest.update(name.encode())
+        digest.update(tensor.detach().cpu().contiguous().reshape(-1).view(torch.uint8).numpy().tobytes())
+    return digest.hexdigest()

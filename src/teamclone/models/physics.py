@@ -11,16 +11,16 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from teamclone.dataset.layout import FLAG_ON_FIELD
+from teamclone.models.features import BALL_DECAY
 from teamclone.models.state import CHANNEL, TYPE_FIELD
 
 BALL_SIZE = 0.085
-BALL_DECAY = 0.94
-BALL_SPEED_MAX = 3.0
-"""rcssserver `serverparam.cpp`: ball_size, ball_decay, ball_speed_max."""
+"""rcssserver `serverparam.cpp`: ball_size."""
 STEPS = 40
 """Cycles that reaching the ball is looked at; whoever needs longer gets this and the rest of his way at full speed."""
 NEVER = 100.0
-"""Cycles to the ball of a player who is not on the field."""
+"""Cycles to the ball of a player who is not on the field; nobody is given more."""
 MATE_RESERVE_M = 0.2
 """By how much agents of the league see a team mate's reach of the ball short, so as not to wait for one another."""
 TURN_MARGIN_DEG = 15.0
@@ -48,11 +48,6 @@ def radians(degrees: Tensor) -> Tensor:
 def kickable_area(types: Tensor) -> Tensor:
     """(...) metres between the centres of player and ball up to which he can kick it; ``types`` (..., fields)."""
     return types[..., TYPE_FIELD["player_size"]] + BALL_SIZE + types[..., TYPE_FIELD["kickable_margin"]]
-
-
-def effective_turn(degrees: Tensor, speed: Tensor, inertia_moment: Tensor) -> Tensor:
-    """By how far a turn moment turns a player who moves (rcssserver `player.cpp`, turn), without its noise."""
-    return degrees / (1.0 + inertia_moment * speed)
 
 
 def kick_rate(ball: Tensor, body: Tensor, types: Tensor) -> Tensor:
@@ -143,8 +138,8 @@ def reach_ball(ball: Tensor, players: Tensor, types: Tensor, *, held: Tensor, ac
     by_sliding = torch.where(slides.any(-1), slides.to(ball.dtype).argmax(-1).to(ball.dtype), NEVER)
     own_steps = torch.minimum(steps.gather(1, actor[:, None])[:, 0], by_sliding)
     steps = steps.scatter(1, actor[:, None], own_steps[:, None])
-    on_field = (players[..., CHANNEL["flags"]].long() & 1) == 1
-    return Reach(steps=torch.where(on_field, steps, NEVER), ball=path)
+    on_field = (players[..., CHANNEL["flags"]].long() & FLAG_ON_FIELD) != 0
+    return Reach(steps=torch.where(on_field, steps.clamp(max=NEVER), NEVER), ball=path)
 
 
 def dash_rate(direction_deg: Tensor) -> Tensor:

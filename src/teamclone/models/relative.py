@@ -224,11 +224,11 @@ class RelativeFeatures(nn.Module):
             ),
         }
         others = _others(players, view, body, reach, to_ball)
-        parts["mates"] = _nearest(others, torch.where(mate, to_me, NEVER), mate, MATES)
-        parts["opponents"] = _nearest(others, torch.where(opponent, to_me, NEVER), opponent, NEAREST_OPPONENTS)
-        parts["rivals"] = _nearest(others, torch.where(opponent, to_ball, NEVER), opponent, RIVALS)
+        parts["mates"] = _nearest(others, to_me, mate, MATES)
+        parts["opponents"] = _nearest(others, to_me, opponent, NEAREST_OPPONENTS)
+        parts["rivals"] = _nearest(others, to_ball, opponent, RIVALS)
         if self.history:
-            parts["past"] = _past(state, me, view)
+            parts["past"] = _past(state, me, view, frames=self.history)
 
         decay = my_type[:, TYPE_FIELD["player_decay"]]
         inertia = my_type[:, TYPE_FIELD["inertia_moment"]]
@@ -261,8 +261,7 @@ class RelativeFeatures(nn.Module):
                     ],
                     1,
                 ),
-                _nearest(position - view.origin[:, None], torch.where(mate, to_me, NEVER), mate, MATES)
-                + view.origin.repeat(1, MATES),
+                _nearest(position - view.origin[:, None], to_me, mate, MATES) + view.origin.repeat(1, MATES),
             ],
             1,
         )
@@ -277,14 +276,14 @@ class _View:
 
     def turn(self, vector: Tensor) -> Tensor:
         """(batch, ..., 2) vectors of the pitch in his axes."""
-        shape = (len(vector), *(1 for _ in vector.shape[1:-1]))
+        shape = (-1, *(1 for _ in vector.shape[1:-1]))
         cos, sin = self.cos.view(shape), self.sin.view(shape)
         x, y = vector[..., 0], vector[..., 1]
         return torch.stack([x * cos + y * sin, y * cos - x * sin], -1)
 
     def see(self, place: Tensor) -> Tensor:
         """(batch, ..., 2) places on the pitch relative to him."""
-        shape = (len(place), *(1 for _ in place.shape[1:-1]), 2)
+        shape = (-1, *(1 for _ in place.shape[1:-1]), 2)
         return self.turn(place - self.origin.view(shape))
 
     def polar(self, place: Tensor) -> Tensor:
@@ -369,15 +368,24 @@ def _others(players: Tensor, view: _View, body: Tensor, reach: Reach, to_ball: T
 
 def _nearest(others: Tensor, distance: Tensor, there: Tensor, count: int) -> Tensor:
     """(batch, count * columns) the nearest first; zeros for those who are not there."""
-    nearest = (-distance).topk(count, dim=1).indices
+    nearest = torch.where(there, -distance, -math.inf).topk(count, dim=1).indices
     chosen = others.gather(1, nearest[..., None].expand(-1, -1, others.shape[2]))
     return (chosen * there.gather(1, nearest)[..., None]).flatten(1)
 
 
-def _past(state: State, me: Tensor, view: _View) -> Tensor:
-    """(batch, frames * columns) the actor and the ball in the frames before, from where he is now; zeros if unknown."""
+def _past(state: State, me: Tensor, view: _View, *, frames: int) -> Tensor:
+    """(batch, frames * columns) the actor and the ball in the frames before, from where he is now; zeros if unknown.
+
+    Raises:
+        ValueError: the state has fewer.
+    """
+    if state.past_known.shape[1] < frames:
+        raise ValueError(
+            f"expected a state with {frames} frames before it, got {state.past_known.shape[1]}; "
+            "ask for them: dataset.state(rows, history=model.inputs.history)"
+        )
     columns = []
-    for back in range(state.past_known.shape[1]):
+    for back in range(frames):
         then, known = _of(state.past_players[:, back], state.actor), state.past_known[:, back, None]
         turned = radians(me[:, CHANNEL["body"]] - then[:, CHANNEL["body"]])
         seen = torch.cat(

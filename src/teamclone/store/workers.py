@@ -178,7 +178,7 @@ class Processes(Executor):
         if pool is None:
             # Spawned, not forked: threads of Arrow and DuckDB do not survive a fork.
             context = multiprocessing.get_context("spawn")
-            pool = self._own.pool = ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker)
+            pool = self._own.pool = ProcessPoolExecutor(1, mp_context=context, initializer=start_worker)
             self._pools.append(pool)
         return pool
 
@@ -188,7 +188,7 @@ class Processes(Executor):
             pool.shutdown(wait)
 
 
-def _start_worker() -> None:
+def start_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it: a killed parent must not leave processes behind."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()

@@ -17,7 +17,7 @@ from teamclone.rcss.player_types import GROUPS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataConfig:
-    """How many samples an epoch and a validation see.
+    """Which samples an epoch and a validation see.
 
     Attributes:
         batch_size: samples in a batch.
@@ -25,12 +25,14 @@ class DataConfig:
         validation_batches: validation samples that are looked at after each epoch, in batches; 0 takes all.
         keep_gb: memory for inputs that cost more to make than a training step, the relative ones, so that they are made
             once; where they do not fit they are made anew for each batch.
+        mirror: share of the training samples that are shown reflected at the long axis, see `models.mirror`.
     """
 
     batch_size: int = 4096
     batches_per_epoch: int = 300
     validation_batches: int = 200
     keep_gb: float = 8.0
+    mirror: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +49,12 @@ class TrainConfig:
         epsilon: added to the optimiser's denominator.
         parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
         parameter_weight: of the parameters' error beside that of the command.
+        balance: how rare commands are made up for: none; oversample: rows of rarer commands are drawn more often, in
+            an epoch of the same length; undersample: those of frequent ones less often; weights: of the cross-entropy.
+        balance_strength: 1 makes all commands equally frequent, 0.5 goes half the way in the logarithm, 0 none of it.
+        prior_correction: probabilities are those of the commands as they are, not as balanced.
+        calibrate: after each epoch find the temperature of the command probabilities that suits the validation
+            samples best.
         precision: fp32, bf16 (autocast), or auto: bf16 where the processor computes in it.
         device: cpu, cuda, or auto: cuda where there is one.
         threads: of the processor; 0 takes all.
@@ -63,6 +71,10 @@ class TrainConfig:
     epsilon: float = 1e-7
     parameter_loss: str = "paper"
     parameter_weight: float = 1.0
+    balance: str = "none"
+    balance_strength: float = 1.0
+    prior_correction: bool = True
+    calibrate: bool = False
     precision: str = "auto"
     device: str = "auto"
     threads: int = 0
@@ -92,6 +104,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "train.schedule": ("constant", "cosine"),
     "train.optimiser": ("adam", "rmsprop", "adagrad"),
     "train.parameter_loss": ("paper", "masked"),
+    "train.balance": ("none", "oversample", "undersample", "weights"),
     "train.precision": ("auto", "fp32", "bf16"),
     "train.device": ("auto", "cpu", "cuda"),
 }
@@ -104,9 +117,12 @@ _AT_LEAST: dict[str, float] = {
     "model.aim_hidden": 1,
     "model.kick_hidden": 1,
     "model.dropout": 0,
+    "model.members": 1,
     "data.keep_gb": 0,
+    "data.mirror": 0,
     "train.weight_decay": 0,
     "train.parameter_weight": 0,
+    "train.balance_strength": 0,
     "train.epochs": 1,
     "train.threads": 0,
     "train.seed": 0,
@@ -115,11 +131,13 @@ _AT_LEAST: dict[str, float] = {
 _ABOVE_ZERO = ("train.learning_rate", "train.epsilon")
 _AT_MOST: dict[str, float] = {
     "model.dropout": 0.9,
+    "data.mirror": 1,
+    "train.balance_strength": 1,
     "train.learning_rate": 1000,
     "train.epsilon": 1000,
     "train.seed": 2**63 - 1,
 }
-"""Beyond these PyTorch itself overflows."""
+"""Beyond these a share is none, or PyTorch itself overflows."""
 
 
 def preset_names() -> list[str]:
@@ -213,6 +231,8 @@ def _idle(config: Config) -> list[str]:
 
     if train.optimiser != "adam":
         idle(("train.betas", "train.weight_decay"), f"train.optimiser = {train.optimiser}")
+    if train.balance == "none":
+        idle(("train.balance_strength", "train.prior_correction"), "train.balance = none")
     if model.features == "paper":
         idle((f"model.{name}" for name in of_relative), "model.features = paper")
         if model.head == "mixture":

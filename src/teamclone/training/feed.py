@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -11,8 +12,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from teamclone.dataset.layout import DETAIL_CHANNELS, FLAG_ON_FIELD
 from teamclone.dataset.reader import Dataset
 from teamclone.models.features import PaperFeatures
+from teamclone.models.mirror import mirror_places, mirror_state, mirror_target
 from teamclone.models.network import Clone
 from teamclone.models.state import Target
 from teamclone.training.gather import Gather
@@ -23,6 +26,9 @@ CARD_SHARE = 0.8
 
 MAKE_ROWS = 8192
 """Samples whose inputs are made at once; bounds memory."""
+MEAN_ROWS = 2**17
+"""Training samples that mean positions are taken over, evenly spread."""
+_FLAGS = [channel.name for channel in DETAIL_CHANNELS].index("flags")
 
 
 class Batch(NamedTuple):
@@ -43,12 +49,14 @@ class Feed:
     """Makes batches for a model.
 
     The paper's inputs are gathered by a compiled pass, one batch ahead. Others, which cost more to make than a training
-    step, are made once for all samples and kept in memory, where they fit; else a thread makes them one batch ahead. On
-    a GPU the arrays of the dataset lie on the card if they fit there, and all that is done with them is done there.
+    step, are made once for all samples and kept in memory, where they fit; else a thread makes them one batch ahead.
+    So are the paper's where samples are mirrored, which the compiled pass does not know. On a GPU the arrays of the
+    dataset lie on the card if they fit there, and all that is done with them is done there.
 
     Args:
         keep_bytes: how much memory kept inputs may take.
         rows: all samples that batches will be asked for.
+        mirrored: those of them that may also be asked for mirrored: the training samples. None where none is.
         on_progress: told how many of them are made, and how many there are.
     """
 
@@ -61,64 +69,130 @@ class Feed:
         *,
         keep_bytes: float = 0.0,
         rows: NDArray[np.int64] | None = None,
+        mirrored: NDArray[np.int64] | None = None,
         on_progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         self.device, self.group, self.features, self.inputs = device, group, model.features, model.inputs
         self.on_card = device.type == "cuda" and dataset.nbytes < CARD_SHARE * torch.cuda.mem_get_info(device)[0]
+        self.places = None if mirrored is None else counterparts(dataset, mirrored).to(device)
         self.dataset = dataset.to(device) if self.on_card else dataset
-        self.quick = not self.on_card and type(model.features) is PaperFeatures
+        self.quick = not self.on_card and type(model.features) is PaperFeatures and mirrored is None
         self._gather: Gather | None = None
-        self.kept: Tensor | None = None
-        columns = 4 * len(self.inputs.names)
-        if rows is not None and not self.quick and len(rows) * columns <= keep_bytes:
-            self.place = torch.full((len(dataset),), -1, dtype=torch.int64)
-            self.place[torch.from_numpy(rows)] = torch.arange(len(rows))
-            self.kept = torch.empty(len(rows), len(self.inputs.names))
-            starts = range(0, len(rows), MAKE_ROWS)
-            # Two threads even where one is asked for: one waits for memory while the other computes.
-            with ThreadPoolExecutor(max(2, torch.get_num_threads())) as pool:
-                made = pool.map(lambda start: self._made(rows[start : start + MAKE_ROWS]), starts)
-                for start, part in zip(starts, made, strict=True):
-                    self.kept[start : start + len(part)] = part
-                    on_progress(start + len(part), len(rows))
+        self._kept: dict[bool, _Kept] = {}
+        asked = {} if self.quick or rows is None else {False: rows}
+        if mirrored is not None:
+            asked[True] = mirrored
+        where = device if self.on_card else torch.device("cpu")
+        if self.on_card:
+            keep_bytes = min(keep_bytes, CARD_SHARE * torch.cuda.mem_get_info(device)[0])
+        for mirror, of in asked.items():
+            keep_bytes -= 4 * len(self.inputs.names) * len(of)
+            if keep_bytes < 0:
+                break
+            self._kept[mirror] = _Kept(of, n=len(dataset), columns=len(self.inputs.names), where=where)
+        self._make(on_progress)
+        self.ahead = not self.on_card and (device.type != "cpu" or set(self._kept) != set(asked) or not asked)
+
+    def _make(self, on_progress: Callable[[int, int], None]) -> None:
+        """Fill what is kept."""
+        total, done = sum(len(kept.rows) for kept in self._kept.values()), 0
+        # Two threads even where one is asked for: one waits for memory while the other computes.
+        with ThreadPoolExecutor(max(2, torch.get_num_threads())) as pool:
+            for mirror, kept in self._kept.items():
+                starts = range(0, len(kept.rows), MAKE_ROWS)
+                parts = [kept.rows[start : start + MAKE_ROWS] for start in starts]
+                for start, made in zip(starts, pool.map(partial(self._made, mirror=mirror), parts), strict=True):
+                    kept.columns[start : start + len(made)] = made
+                    done += len(made)
+                    on_progress(done, total)
 
     @torch.no_grad()
-    def _made(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
-        """(rows, columns) inputs before normalisation."""
+    def _made(self, rows: NDArray[np.int64] | Tensor, *, mirror: bool = False) -> Tensor:
+        """(rows, columns) inputs before normalisation, on the device."""
         if self.on_card:
             rows = torch.as_tensor(rows, device=self.device)
-        return self.inputs.project(self.dataset.state(rows, history=self.inputs.history))
+        state = self.dataset.state(rows, history=self.inputs.history).to(self.device)
+        if mirror and self.places is not None:
+            state = mirror_state(state, self.places)
+        return self.inputs.project(state)
+
+    def _columns(self, rows: NDArray[np.int64] | Tensor, *, mirror: bool = False) -> Tensor:
+        """The same, from what is kept if they are among it."""
+        kept = self._kept.get(mirror)
+        return self._made(rows, mirror=mirror) if kept is None else kept(rows).to(self.device)
 
     def columns(self, rows: NDArray[np.int64]) -> Iterator[Tensor]:
         """Inputs of samples before normalisation, in chunks, in the memory of the processor."""
         for start in range(0, len(rows), MAKE_ROWS):
-            part = rows[start : start + MAKE_ROWS]
-            yield self.kept[self.place[torch.from_numpy(part)]] if self.kept is not None else self._made(part).cpu()
+            yield self._columns(rows[start : start + MAKE_ROWS]).cpu()
 
-    def batches(self, rows: NDArray[np.int64], batch_size: int) -> Iterator[Batch]:
-        """The samples in the order of ``rows``, cut into batches; the last may be shorter. The model is fitted."""
-        starts = range(0, len(rows), batch_size)
-        if self.on_card or self.kept is not None:
-            there = torch.from_numpy(rows).to(self.device if self.on_card else "cpu")
-            yield from (self._batch(there[start : start + batch_size]) for start in starts)
+    def batches(
+        self, rows: NDArray[np.int64], batch_size: int, *, mirrored: NDArray[np.bool_] | None = None
+    ) -> Iterator[Batch]:
+        """The samples in the order of ``rows``, cut into batches; the last may be shorter. The model is fitted.
+
+        Args:
+            mirrored: (len(rows),) which of them to mirror; None for none.
+        """
+        parts = [slice(start, start + batch_size) for start in range(0, len(rows), batch_size)]
+
+        def mirrored_in(part: slice) -> NDArray[np.bool_] | None:
+            return None if mirrored is None else mirrored[part]
+
+        if not self.ahead:
+            there = torch.from_numpy(rows).to(self.device)
+            yield from (self._batch(there[part], mirrored_in(part)) for part in parts)
             return
         if self.quick and self._gather is None:
             self._gather = Gather(self.dataset, cast(PaperFeatures, self.features))
         with ThreadPoolExecutor(1) as pool:
-            ahead = pool.submit(self._batch, rows[:batch_size])
-            for start in starts:
-                inputs, target, whole = ahead.result()
-                ahead = pool.submit(self._batch, rows[start + batch_size : start + 2 * batch_size])
+            made = [pool.submit(self._batch, rows[part], mirrored_in(part)) for part in parts[:1]]
+            for part in [*parts[1:], None]:
+                inputs, target, whole = made.pop().result()
+                if part is not None:
+                    made = [pool.submit(self._batch, rows[part], mirrored_in(part))]
                 target = Target(*(tensor.to(self.device) for tensor in target))
                 yield Batch(inputs.to(self.device), target, whole.to(self.device))
 
     @torch.no_grad()
-    def _batch(self, rows: NDArray[np.int64] | Tensor) -> Batch:
-        share = rows[self.group.rank :: self.group.size]
-        if self._gather is not None:
-            inputs = self._gather(np.asarray(share))
-        else:
-            columns = self.kept[self.place[torch.as_tensor(share)]] if self.kept is not None else self._made(share)
-            inputs = self.inputs.normalise(columns)
+    def _batch(self, rows: NDArray[np.int64] | Tensor, mirrored: NDArray[np.bool_] | None = None) -> Batch:
+        mine = slice(self.group.rank, None, self.group.size)
+        share = rows[mine]
         target = self.dataset.target(share)
-        return Batch(inputs, target, target.kind if self.group.size == 1 else self.dataset.target(rows).kind)
+        whole = target.kind if self.group.size == 1 else self.dataset.target(rows).kind
+        if self._gather is not None:
+            return Batch(self._gather(np.asarray(share)), target, whole)
+        if mirrored is None:
+            return Batch(self.inputs.normalise(self._columns(share)), target, whole)
+        turned = torch.from_numpy(mirrored[mine])
+        columns = torch.empty(len(share), len(self.inputs.names), device=self.device)
+        for mirror in (False, True):
+            some = torch.nonzero(turned == mirror).squeeze(1)
+            if len(some):
+                part = share[some.to(share.device) if isinstance(share, Tensor) else some.numpy()]
+                columns[some.to(self.device)] = self._columns(part, mirror=mirror)
+        turned = turned.to(target.parameters.device)
+        parameters = torch.where(turned[:, None], mirror_target(target).parameters, target.parameters)
+        return Batch(self.inputs.normalise(columns), Target(target.kind, parameters), whole)
+
+
+class _Kept:
+    """Inputs of some of ``n`` samples before normalisation, (len(rows), columns), in the memory ``where``."""
+
+    def __init__(self, rows: NDArray[np.int64], *, n: int, columns: int, where: torch.device) -> None:
+        self.rows, self.columns = rows, torch.empty(len(rows), columns, device=where)
+        self.place = torch.full((n,), -1, dtype=torch.int64, device=where)
+        self.place[torch.from_numpy(rows).to(where)] = torch.arange(len(rows), device=where)
+
+    def __call__(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
+        return self.columns[self.place[torch.as_tensor(rows, device=self.place.device)]]
+
+
+def counterparts(dataset: Dataset, rows: NDArray[np.int64]) -> Tensor:
+    """`mirror_places` of the players' mean positions in the frames of these samples."""
+    frames = dataset.samples["frame"].numpy()[rows[:: max(1, len(rows) // MEAN_ROWS)]]
+    position = dataset.frames["position"].numpy()[frames].astype(np.float64)
+    there = (dataset.frames["detail"].numpy()[frames, :, _FLAGS] & FLAG_ON_FIELD) != 0
+    count = there.sum(0)[:, None]
+    total = np.where(there[..., None], position, 0.0).sum(0)
+    return mirror_places(np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0))

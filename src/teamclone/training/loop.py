@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
-from teamclone.dataset.order import epoch_order
+from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.files import write_atomic
-from teamclone.models.loss import ParameterLoss
+from teamclone.models.loss import Balance, ParameterLoss
 from teamclone.models.network import Clone
-from teamclone.training.checkpoint import load_progress, save_progress, save_weights
+from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.training.calibration import Calibration
+from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
 from teamclone.training.feed import Feed
 from teamclone.training.group import joined, local_rank
-from teamclone.training.run import BEST, RESUME, Run, create_run, locked, open_run, save_config
+from teamclone.training.run import BASE, BEST, RESUME, Base, Run, create_run, locked, open_run, save_config
 from teamclone.training.scores import Scores
 
 DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
@@ -60,9 +62,10 @@ def train(
     run_folder: Path | str,
     *,
     resume: bool = False,
+    base: Base | None = None,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Run:
-    """Train a clone; what a run folder holds is said in `run`.
+    """Train a clone, from fresh weights or from those of ``base``; what a run folder holds is said in `run`.
 
     Every epoch ends with a checkpoint from which ``resume`` goes on exactly as if nothing had happened: weights,
     order of the samples and figures are a pure function of config and dataset (on one machine, with as many threads).
@@ -87,7 +90,15 @@ def train(
             if resume:
                 _check_resumable(config, dataset, open_run(folder))
             else:
-                create_run(folder, config, dataset, device=device.type, precision=precision, processes=group.size)
+                create_run(
+                    folder,
+                    config,
+                    dataset,
+                    device=device.type,
+                    precision=precision,
+                    processes=group.size,
+                    base=base,
+                )
             stack.enter_context(locked(folder))
             if resume:
                 save_config(folder, config)
@@ -106,11 +117,15 @@ def train(
             group,
             keep_bytes=config.data.keep_gb * 1e9,
             rows=np.concatenate([rows, validation_rows]),
+            mirrored=rows if config.data.mirror else None,
             on_progress=lambda made, of: on_progress(Progress(0, config.train.epochs, made, of, None)),
         )
         done = 0
         if run.checkpoint_path(RESUME).is_file():
             done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
+        elif BASE in run.environment:
+            load_weights(run.checkpoint_path(BASE), model)
+            model.head.temperature.fill_(1.0)  # that of the base suits other teams
         else:
             model.inputs.fit(feed.columns(rows[:: max(1, len(rows) // FIT_ROWS)]))
         group.share_weights(model)
@@ -120,6 +135,8 @@ def train(
             parameter_loss=cast(ParameterLoss, config.train.parameter_loss),
             weight=config.train.parameter_weight,
         )
+        kinds = dataset.samples["kind"].numpy()[rows]
+        draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(CLONED_KINDS)), device)
         batch_size = config.data.batch_size
         journal = stack.enter_context(Journal(run, done)) if group.rank == 0 else None
         began = time.monotonic()
@@ -132,16 +149,24 @@ def train(
                     break
 
             torch.manual_seed(_mixed(config.train.seed, epoch))
-            slice_rows = config.data.batches_per_epoch * batch_size
-            order = rows[epoch_order(len(rows), seed=config.train.seed, epoch=epoch - 1, slice_rows=slice_rows)]
+            chosen = epoch_order(
+                len(rows),
+                seed=config.train.seed,
+                epoch=epoch - 1,
+                slice_rows=config.data.batches_per_epoch * batch_size,
+                draws=None if draws is None else draws[kinds],
+            )
+            order, mirrored = rows[chosen], None
+            if config.data.mirror:
+                mirrored = epoch_mirrored(len(order), seed=config.train.seed, epoch=epoch - 1, share=config.data.mirror)
             batches = math.ceil(len(order) / batch_size)
             scores = Scores(device)
             model.train()
-            for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size), 1):
+            for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size, mirrored=mirrored), 1):
                 for weights in optimiser.param_groups:
                     weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
                 output = answer_of(inputs)
-                loss = loss_of(output, target, whole=whole)
+                loss = loss_of(output, target, balance=balance, whole=whole)
                 optimiser.zero_grad(set_to_none=True)
                 loss.total.backward()  # type: ignore[no-untyped-call]
                 group.add_up_gradients(model)
@@ -152,12 +177,19 @@ def train(
             record |= {f"train_{name}": value for name, value in scores.table(group).items()}
             record["samples_per_s"] = len(order) / (time.monotonic() - epoch_began)
             model.eval()
-            scores = Scores(device)
+            scores, calibration = Scores(device), Calibration(device)
             with torch.no_grad():
                 for inputs, target, whole in feed.batches(validation_rows, batch_size):
                     output = answer_of(inputs)
                     scores.add(loss_of(output, target, whole=whole), model.head.point(output), target, batch=len(whole))
+                    if config.train.calibrate:
+                        calibration.add(model.head.logits(output), target.kind)
             record |= {f"validation_{name}": value for name, value in scores.table(group).items()}
+            if config.train.calibrate:
+                record["temperature"], gained = calibration.fit(group)
+                model.head.temperature.fill_(record["temperature"])
+                record["validation_cross_entropy"] -= gained
+                record["validation_loss"] -= gained
             record["seconds"] = time.monotonic() - epoch_began
             if not (math.isfinite(record["train_loss"]) and math.isfinite(record["validation_loss"])):
                 kept = f"the checkpoints of epoch {epoch - 1} are kept" if epoch > 1 else "nothing is kept"
@@ -265,6 +297,34 @@ def _optimiser(config: TrainConfig, model: Clone) -> torch.optim.Optimizer:
             weights, lr=rate, betas=betas, eps=epsilon, weight_decay=config.weight_decay, fused=True
         )
     return torch.optim.Adam(weights, lr=rate, betas=betas, eps=epsilon, fused=True)
+
+
+def balanced(
+    config: TrainConfig, counts: NDArray[np.integer], device: torch.device
+) -> tuple[NDArray[np.float32] | None, Balance | None]:
+    """How commands of unlike frequency are made up for.
+
+    Args:
+        counts: (4,) training samples of each command.
+
+    Returns:
+        (4,) how often a sample of each command is drawn, None for once; and what the loss needs to know, None for
+        nothing.
+    """
+    if config.balance == "none":
+        return None, None
+    # Of a command that never comes nothing is known: 1.
+    shares = counts / counts.sum()
+    factors = np.where(counts > 0, shares, 1.0) ** -config.balance_strength
+    factors = np.where(counts > 0, factors / (factors @ shares), 1.0)
+    draws = None
+    if config.balance == "oversample":
+        draws = factors.astype(np.float32)
+    elif config.balance == "undersample":
+        draws = (factors / factors[counts > 0].max()).astype(np.float32)
+    weight = torch.tensor(factors if config.balance == "weights" else np.ones_like(factors), dtype=torch.float32)
+    shift = torch.tensor(np.log(factors) if config.prior_correction else np.zeros_like(factors), dtype=torch.float32)
+    return draws, Balance(weight.to(device), shift.to(device))
 
 
 def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ RUN/metrics.jsonl                one line per epoch
 RUN/tensorboard/                 the same for TensorBoard
 RUN/checkpoints/NAME.safetensors weights: last, best-loss, best-accuracy, best-recall-<command>, best-parameters
 RUN/checkpoints/resume.safetensors  weights and optimiser after the last finished epoch
+RUN/checkpoints/base.safetensors    of an adapted run: the weights it began with
 """
 
 from __future__ import annotations
@@ -33,14 +34,17 @@ from teamclone.errors import RunError, UsageError
 from teamclone.files import write_atomic
 from teamclone.models.network import Clone
 from teamclone.rcss.commands import CLONED_KINDS
-from teamclone.training.checkpoint import load_weights
+from teamclone.training.checkpoint import load_weights, save_weights
 from teamclone.training.config import Config, config_from, to_toml
 
-FORMAT = 1
+FORMAT = 2
 """Raised whenever a reader of the old folder would misread the new one."""
 
 RESUME = "resume"
 """The checkpoint that holds the optimiser too; not a model to load."""
+
+BASE = "base"
+"""The checkpoint from which an adapted run begins, its own copy; a model to load as any other."""
 
 
 BEST: dict[str, tuple[str, Callable[[float, float], bool]]] = {
@@ -63,6 +67,19 @@ class Best:
     figure: str
     epoch: int
     value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Base:
+    """What an adapted run begins with.
+
+    Attributes:
+        model: weights and input normalisation.
+        origin: where they are from, ``base`` of ``environment.json``.
+    """
+
+    model: Clone
+    origin: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +197,16 @@ def is_run(path: Path) -> bool:
     return (path / "environment.json").is_file()
 
 
-def create_run(path: Path, config: Config, dataset: Dataset, *, device: str, precision: str, processes: int = 1) -> Run:
+def create_run(
+    path: Path,
+    config: Config,
+    dataset: Dataset,
+    *,
+    device: str,
+    precision: str,
+    processes: int = 1,
+    base: Base | None = None,
+) -> Run:
     """Begin a run folder; ``device`` and ``precision`` are what ``auto`` came to on this machine.
 
     Raises:
@@ -191,13 +217,16 @@ def create_run(path: Path, config: Config, dataset: Dataset, *, device: str, pre
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise RunError(f"{path}: is not an empty folder; choose another one")
     resources = {"device": device, "precision": precision, "processes": processes}
-    text = json.dumps(_environment(dataset) | resources, indent=2) + "\n"
+    origin = {"base": base.origin} if base else {}
+    text = json.dumps(_environment(dataset) | resources | origin, indent=2) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         (temporary / "checkpoints").mkdir(parents=True)
         save_config(temporary, config)
         write_atomic(temporary / "environment.json", text.encode())
+        if base:
+            save_weights(temporary / "checkpoints" / f"{BASE}.safetensors", base.model, epoch=0)
         try:
             temporary.rename(path)
         except OSError as error:

@@ -24,7 +24,7 @@ from disk import small_disk
 from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
-from teamclone.errors import ClusterError, DatasetError, StoreError
+from teamclone.errors import ClusterError, DatasetError, StoreError, UsageError
 from teamclone.logs import read_match
 from teamclone.store import Store, create_store, open_store
 
@@ -46,7 +46,7 @@ def store(tmp_path_factory: pytest.TempPathFactory, fixtures_dir: Path) -> Store
 @pytest.fixture
 def config(store: Store) -> DatasetConfig:
     (row,) = {(row["left_name"], row["right_name"]) for row in store.matches().to_pylist()}
-    return DatasetConfig(team=row[0])
+    return DatasetConfig(teams=(row[0],))
 
 
 class Backwards(ThreadPoolExecutor):
@@ -128,6 +128,57 @@ def test_rows_are_split_within_each_match(store: Store, config: DatasetConfig, t
         of_match = dataset.samples["split"][dataset.match(np.arange(len(dataset))) == match].numpy()
         assert (of_match == Split.TRAIN).mean() == pytest.approx(0.95, abs=1e-3)
         assert (of_match == Split.TEST).mean() == pytest.approx(0.025, abs=1e-3)
+
+
+def test_a_match_of_two_modelled_teams_is_seen_from_both_sides(store: Store, tmp_path: Path) -> None:
+    (pair,) = {(row["left_name"], row["right_name"]) for row in store.matches().to_pylist()}
+    for split in SplitBy:
+        report = build_dataset(DatasetConfig(teams=pair, split=split), store=store, out=tmp_path / split, jobs=1)
+        dataset = open_dataset(tmp_path / split)
+        assert (dataset.meta["team"], dataset.meta["teams"]) == (" + ".join(pair), list(pair))
+        assert dataset.meta["options"]["team"] == list(pair)
+        assert report["matches_without_team"] == 0
+        twins = list(zip(dataset.matches[::2], dataset.matches[1::2], strict=True))
+        assert len(twins) == MATCHES
+        for left, right in twins:
+            assert (left["team"], right["opponent"], left["side"], right["side"]) == (*pair[:1] * 2, "left", "right")
+            assert (right["team"], left["opponent"]) == (*pair[1:] * 2,)
+            assert (left["match_id"], left["split"]) == (right["match_id"], right["split"])
+    assert {match["split"] for match in open_dataset(tmp_path / "match").matches} >= {"train", "validation", "test"}
+
+    # Each entry is the same as in the dataset of its team alone.
+    pooled = open_dataset(tmp_path / "match")
+    index = pooled.match(np.arange(len(pooled)))
+    for side, team in enumerate(pair):
+        build_dataset(DatasetConfig(teams=(team,)), store=store, out=tmp_path / team, jobs=1)
+        alone = open_dataset(tmp_path / team)
+        rows = np.flatnonzero(index % 2 == side)
+        assert len(rows) == len(alone) > 0
+        every = np.arange(len(alone))
+        assert pooled.state(rows).players.equal(alone.state(every).players)
+        assert pooled.target(rows).parameters.equal(alone.target(every).parameters)
+        assert "teams" not in alone.meta
+        assert alone.meta["options"]["team"] == alone.meta["team"] == team
+        assert not any("team" in match for match in alone.matches)
+
+
+def test_a_match_against_an_unseen_team_is_unseen_from_both_sides(store: Store, tmp_path: Path) -> None:
+    (pair,) = {(row["left_name"], row["right_name"]) for row in store.matches().to_pylist()}
+    report = build_dataset(DatasetConfig(teams=pair, unseen=pair[1:]), store=store, out=tmp_path / "ds", jobs=1)
+    assert {match["split"] for match in report["matches"]} == {"unseen"}
+
+
+@pytest.mark.parametrize(
+    ("teams", "message"),
+    [
+        ((TEAM, "HELIOS_bse"), r"team 'HELIOS_bse' is in no match of the store; did you mean 'HELIOS_base'\?"),
+        ((TEAM, TEAM), "expected different teams, got HELIOS_base, HELIOS_base; name each once"),
+        ((), "expected different teams, got none"),
+    ],
+)
+def test_teams_that_cannot_be_pooled(store: Store, tmp_path: Path, teams: tuple[str, ...], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        build_dataset(DatasetConfig(teams=teams), store=store, out=tmp_path / "ds", jobs=1)
 
 
 def test_memory_does_not_grow_with_the_matches(store: Store, config: DatasetConfig, tmp_path: Path) -> None:

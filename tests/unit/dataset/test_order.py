@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teamclone.dataset.order import epoch_order
+from teamclone.dataset.order import epoch_mirrored, epoch_order
 
 SIZES = st.integers(1, 400)
 
@@ -38,3 +38,41 @@ def test_slices_are_shuffled_and_depend_on_the_seed() -> None:
     assert not np.array_equal(zero, one)
     # A sorted or merely rotated order has a neighbour difference of 1 almost everywhere.
     assert np.mean(np.abs(np.diff(zero)) == 1) < 0.05
+
+
+DRAWS = st.lists(st.floats(0.01, 6), min_size=1, max_size=200)
+
+
+@given(draws=DRAWS, slice_rows=SIZES, turn=st.integers(0, 3))
+def test_a_round_has_every_row_as_often_as_asked(draws: list[float], slice_rows: int, turn: int) -> None:
+    total = max(1, round(sum(draws)))
+    slices = -(-total // slice_rows)
+    parts = [
+        epoch_order(len(draws), seed=0, epoch=epoch, slice_rows=slice_rows, draws=np.array(draws))
+        for epoch in range(turn * slices, (turn + 1) * slices)
+    ]
+    lengths = [len(part) for part in parts]
+    assert sum(lengths) == total
+    assert max(lengths) <= slice_rows
+    assert max(lengths) - min(lengths) <= 1
+    count = np.bincount(np.concatenate(parts), minlength=len(draws))
+    wanted = np.array(draws) * total / sum(draws)
+    assert (np.abs(count - wanted) < 1 + 1e-9).all()
+
+
+def test_over_the_rounds_all_rows_are_drawn_as_often_as_asked() -> None:
+    draws = np.repeat([0.1, 0.5, 3.0], 100)
+    epochs = [epoch_order(300, seed=0, epoch=epoch, slice_rows=360, draws=draws) for epoch in range(400)]
+    assert not np.array_equal(np.sort(epochs[0]), np.sort(epochs[1]))
+    mean = np.bincount(np.concatenate(epochs), minlength=300) / 400
+    assert np.abs(mean - draws).max() < 0.12
+    again = epoch_order(300, seed=0, epoch=7, slice_rows=360, draws=draws)
+    assert np.array_equal(again, epochs[7])
+
+
+def test_of_an_epoch_the_wanted_share_is_mirrored() -> None:
+    first, again, other = (epoch_mirrored(10_000, seed=0, epoch=epoch, share=0.3) for epoch in (0, 0, 1))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert abs(first.mean() - 0.3) < 0.02
+    assert epoch_mirrored(100, seed=0, epoch=0, share=1.0).all()

@@ -72,6 +72,59 @@ def test_what_the_log_lacks_is_nan(tmp_path: Path) -> None:
     assert not state.players[1].isnan().any()
 
 
+CYCLES = np.array([5, 6, 7, 9, 10, 10, 11, 12, 13, 14])
+"""Of one match and then, from the seventh frame on, of another: a gap, a stoppage, another match that goes on."""
+
+
+def followed(folder: Path) -> Path:
+    """Ten frames of two matches with a sample each; the ball lies at (place of the frame, cycle)."""
+    frames = {array.name: np.zeros((10, *array.shape), array.dtype) for array in FRAME_ARRAYS}
+    samples = {array.name: np.zeros((10, *array.shape), array.dtype) for array in SAMPLE_ARRAYS}
+    frames["match"][6:] = 1
+    frames["cycle"][:] = CYCLES
+    frames["ball"][:, 0], frames["ball"][:, 1] = np.arange(10), CYCLES
+    frames["position"][:, 3, 0] = -np.arange(10)
+    frames["detail"][:, 3, DETAIL["body"]] = 100 * np.arange(10)
+    frames["detail"][2, 3, DETAIL["neck"]] = MISSING
+    samples["frame"][:] = np.arange(10)
+    samples["player"][:] = 3
+    meta = {"team": "A", "matches": [{"match_id": "a"}, {"match_id": "b"}]}
+    types = np.zeros((2, 1, len(FIELDS)), np.float32)
+    return write_dataset(folder, frames=frames, samples=samples, player_types=types, meta=meta)
+
+
+def test_history_is_the_cycles_before_in_the_same_match(tmp_path: Path) -> None:
+    rows = np.array([9, 2, 0, 3, 4, 5, 6, 7])
+    state = open_dataset(followed(tmp_path / "ds")).state(rows, history=2)
+    known = {0: (0, 0), 2: (1, 1), 3: (0, 0), 4: (1, 0), 5: (0, 0), 6: (0, 0), 7: (1, 0), 9: (1, 1)}
+    assert state.past_known.int().tolist() == [list(known[row]) for row in rows]
+    assert state.past_ball.shape == (8, 2, 4)
+    assert state.past_players.shape == (8, 2, 22, len(PLAYER_CHANNELS))
+    for index, row in enumerate(rows):
+        for back in range(2):
+            # Where it is not known the past repeats the present.
+            frame = row - back - 1 if known[row][back] else row
+            assert state.past_ball[index, back].tolist() == [frame, CYCLES[frame], 0, 0]
+            then = state.past_players[index, back]
+            assert (then[3, CHANNEL["x"]], then[3, CHANNEL["body"]]) == (-frame, frame)
+            assert bool(then[3, CHANNEL["neck"]].isnan()) == (frame == 2)
+    assert state.ball[:, 0].tolist() == rows.tolist()
+
+
+def test_no_history_unless_asked_for(tmp_path: Path) -> None:
+    dataset = open_dataset(followed(tmp_path / "ds"))
+    plain, asked = dataset.state(np.arange(10)), dataset.state(torch.arange(10), history=40)
+    assert plain.past_ball.shape == (10, 0, 4)
+    assert plain.past_players.shape == (10, 0, 22, len(PLAYER_CHANNELS))
+    assert plain.past_known.shape == (10, 0)
+    for name in ("ball", "types", "actor"):
+        assert torch.equal(getattr(plain, name), getattr(asked, name))
+    # However far back one looks, what is known was so many cycles before.
+    row, back = asked.past_known.nonzero().T
+    assert torch.equal(asked.past_ball[row, back, 1].long(), torch.from_numpy(CYCLES)[row] - back - 1)
+    assert asked.past_known[9].nonzero()[:, 0].tolist() == [0, 1, 2]
+
+
 def test_last_kind_is_the_actors_own_executed_command(tmp_path: Path) -> None:
     # Row 0: not in the log; row 1: kick; row 2: catch, which no clone predicts.
     assert open_dataset(tiny(tmp_path / "ds")).last_kind(np.arange(3)).tolist() == [-1, 2, -1]

@@ -23,6 +23,7 @@ def outcome(kind, last) -> Outcome:
     return Outcome(
         probabilities=np.full((n, 4), 0.25, np.float32),
         parameters=np.zeros((n, 6), np.float32),
+        parameter_log_loss=np.full(n, -1.5, np.float32),
         kind=np.array(kind),
         issued=np.full((n, 6), np.nan, np.float32),
         last=np.array(last),

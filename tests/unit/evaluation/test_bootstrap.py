@@ -16,6 +16,7 @@ def made(seed: int, *, n: int = 400, n_matches: int = 3) -> Outcome:
     return Outcome(
         probabilities=generator.dirichlet(np.ones(4), n).astype(np.float32),
         parameters=generator.uniform(-100, 100, (n, 6)).astype(np.float32),
+        parameter_log_loss=generator.normal(3, 1, n).astype(np.float32),
         kind=kind,
         issued=issued,
         last=generator.integers(-1, 4, n),

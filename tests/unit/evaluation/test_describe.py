@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ def outcome(n: int = 600, n_matches: int = 3) -> Outcome:
             generator.permutation(n)
         ],
         parameters=np.full((n, 6), 50, np.float32),
+        parameter_log_loss=np.where(kind == 0, generator.normal(3, 1, n), np.nan).astype(np.float32),
         kind=kind,
         issued=issued,
         last=kind[generator.permutation(n)],
@@ -49,6 +51,10 @@ def test_figures_are_those_of_the_metrics() -> None:
     assert (dash["median"], dash["constant"]["mean"], dash["constant"]["guess"]) == (10.0, 55.0, 5.0)
     assert section["parameters"]["kick_power"]["mean"]["value"] is None
     assert sum(match["rows"] for match in section["matches"]) == 600
+    loss = section["commands"]["dash"]["parameter_log_loss"]
+    assert loss["value"] == pytest.approx(float(np.nanmean(made.parameter_log_loss)), abs=1e-6)
+    assert loss["low"] < loss["value"] < loss["high"]
+    assert section["commands"]["turn"]["parameter_log_loss"] == {"value": None, "low": None, "high": None}
 
 
 def test_gain_over_a_baseline_is_paired() -> None:
@@ -70,6 +76,30 @@ def test_opponents_are_the_split_in_parts() -> None:
     assert by_name["Blue"]["accuracy"]["low"] is None
     red = made.rows(made.match < 2)
     assert by_name["Red"]["accuracy"]["value"] == pytest.approx((red.probabilities.argmax(1) == red.kind).mean())
+
+
+def test_two_entries_of_one_match_are_one_draw() -> None:
+    """Seen from both teams it is still the same game."""
+    made = outcome(n_matches=4)
+    twins = [{"match_id": f"m{index // 2}", "opponent": "Red" if index % 2 else "Blue"} for index in range(4)]
+    section = describe(made, baselines=BASELINES, matches=twins)
+    joined = describe(replace(made, match=made.match // 2), baselines=BASELINES, matches=MATCHES)
+    for figure, value in joined["model"].items():
+        assert section["model"][figure] == pytest.approx(value)
+    for rule, row in joined["baselines"].items():
+        assert section["baselines"][rule]["accuracy_gain"] == pytest.approx(row["accuracy_gain"])
+    assert section["commands"]["kick"]["recall"] == pytest.approx(joined["commands"]["kick"]["recall"])
+    apart = describe(made, baselines=BASELINES, matches=MATCHES)
+    assert section["model"]["accuracy"]["low"] != pytest.approx(apart["model"]["accuracy"]["low"])
+    assert [row["match_id"] for row in section["matches"]] == ["m0", "m1"]
+    assert section["matches"][0]["opponent"] == "Blue and Red"
+    assert section["matches"][0]["rows"] == (made.match < 2).sum()
+    assert {row["opponent"]: (row["matches"], row["rows"]) for row in section["opponents"]} == {
+        "Blue": (2, (made.match % 2 == 0).sum()),
+        "Red": (2, (made.match % 2 == 1).sum()),
+    }
+    one = describe(outcome(n_matches=2), baselines=BASELINES, matches=twins)
+    assert one["model"]["accuracy"]["low"] is None
 
 
 def test_one_match_has_no_interval() -> None:
@@ -142,6 +172,7 @@ def test_numbers_that_never_played_in_training_are_named():
     outcome = Outcome(
         probabilities=probabilities,
         parameters=np.zeros((5, 6), np.float32),
+        parameter_log_loss=np.zeros(5, np.float32),
         kind=kind,
         issued=np.zeros((5, 6), np.float32),
         last=kind,

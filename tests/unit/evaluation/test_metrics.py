@@ -16,11 +16,12 @@ DASH, TURN, KICK, TACKLE = range(4)
 HAND = np.array([[60, 8, 2, 0], [9, 15, 0, 0], [1, 0, 4, 0], [0, 1, 0, 0]])
 
 
-def outcome(probabilities, kind, *, parameters=None, issued=None, last=None, match=None) -> Outcome:
+def outcome(probabilities, kind, *, parameters=None, losses=None, issued=None, last=None, match=None) -> Outcome:
     n = len(kind)
     return Outcome(
         probabilities=np.asarray(probabilities, np.float32).reshape(n, 4),
         parameters=np.zeros((n, 6), np.float32) if parameters is None else np.asarray(parameters, np.float32),
+        parameter_log_loss=np.full(n, np.nan, np.float32) if losses is None else np.asarray(losses, np.float32),
         kind=np.asarray(kind, np.int64),
         issued=np.full((n, 6), np.nan, np.float32) if issued is None else np.asarray(issued, np.float32),
         last=np.full(n, -1, np.int64) if last is None else np.asarray(last, np.int64),
@@ -175,3 +176,18 @@ def test_measure_keeps_matches_apart() -> None:
 def test_nothing_at_all_is_undefined_not_wrong() -> None:
     scores = metrics.scores(metrics.measure(outcome(np.zeros((0, 4)), []))[1].total())
     assert all(np.isnan(value) for value in scores)
+
+
+def test_parameter_log_loss_is_summed_by_match_and_command_given() -> None:
+    """Match 0: dashes of 2 and 4 nats, a turn without a likelihood; match 1: a dash of 3, a kick of -1."""
+    made = outcome(
+        np.full((5, 4), 0.25), [DASH, DASH, TURN, DASH, KICK], losses=[2, 4, math.nan, 3, -1], match=[0, 0, 0, 1, 1]
+    )
+    _, sums = metrics.measure(made)
+    np.testing.assert_array_equal(sums.likelihood_count, [[2, 0, 0, 0], [1, 0, 1, 0]])
+    np.testing.assert_array_equal(sums.parameter_log_loss, [[6, 0, 0, 0], [3, 0, -1, 0]])
+
+
+def test_an_even_guess_spreads_over_the_range_of_each_parameter() -> None:
+    power, angle = math.log(100), math.log(360)
+    np.testing.assert_allclose(metrics.EVEN_LOG_LOSS, [power + angle, angle, power + angle, angle])

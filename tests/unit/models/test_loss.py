@@ -5,7 +5,15 @@ from math import log
 import pytest
 import torch
 
-from teamclone.models.loss import Loss, ParameterLoss, issued, point_loss, projected_parameters
+from teamclone.models.loss import (
+    Balance,
+    Loss,
+    ParameterLoss,
+    command_loss,
+    issued,
+    point_loss,
+    projected_parameters,
+)
 from teamclone.models.state import Target
 
 TARGET = Target(
@@ -54,8 +62,9 @@ def test_no_gradient_reaches_parameters_that_the_mask_hides() -> None:
     assert torch.equal(predicted.grad != 0, issued(TARGET.kind))
 
 
+@pytest.mark.parametrize("balance", [None, Balance(torch.tensor([0.5, 1.0, 2.0, 9.0]), torch.arange(4.0))])
 @pytest.mark.parametrize("parameter_loss", ["paper", "masked"])
-def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterLoss) -> None:
+def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterLoss, balance: Balance | None) -> None:
     """Also where the shares differ in length and in how many parameters were issued, and where one is empty."""
     generator = torch.Generator().manual_seed(0)
     kind = torch.tensor([0, 0, 1, 3, 2, 1, 1])
@@ -65,9 +74,11 @@ def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterL
 
     def loss_of(part: slice) -> Loss:
         share = Target(kind[part], target.parameters[part])
-        return point_loss(logits[part], projected[part], share, parameter_loss=parameter_loss, whole=kind)
+        return point_loss(
+            logits[part], projected[part], share, parameter_loss=parameter_loss, balance=balance, whole=kind
+        )
 
-    whole = point_loss(logits, projected, target, parameter_loss=parameter_loss)
+    whole = point_loss(logits, projected, target, parameter_loss=parameter_loss, balance=balance)
     expected = torch.autograd.grad(whole.total, (logits, projected))
     shares = [loss_of(part) for part in (slice(0, 2), slice(2, 7), slice(7, 7))]
     for together, *parts in zip(whole, *shares, strict=True):
@@ -75,3 +86,28 @@ def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterL
     got = torch.autograd.grad(sum(share.total for share in shares), (logits, projected))
     for one, other in zip(expected, got, strict=True):
         assert torch.allclose(one, other)
+
+
+def test_a_balanced_cross_entropy_by_hand() -> None:
+    logits = torch.log(torch.tensor([[0.5, 0.2, 0.2, 0.1], [0.25, 0.25, 0.25, 0.25]]))
+    balance = Balance(torch.tensor([0.5, 3.0, 1.0, 1.0]), torch.log(torch.tensor([1.0, 2.0, 1.0, 1.0])))
+    loss = point_loss(logits, torch.zeros(2, 6), Target(*(part[:2] for part in TARGET)), balance=balance)
+    # Shifted, the first row is .5 .4 .2 .1 of 1.2, the second 1 2 1 1 of 5.
+    assert float(loss.cross_entropy) == pytest.approx(-(0.5 * log(0.5 / 1.2) + 3 * log(2 / 5)) / 2)
+
+
+@pytest.mark.parametrize("weighted", [True, False])
+def test_with_prior_correction_the_best_logits_are_those_of_the_true_prior(weighted: bool) -> None:
+    """Whether commands are weighed or drawn more often, as here by whole numbers."""
+    factors = torch.tensor([1.0, 2.0, 4.0, 8.0])
+    kind = torch.tensor([0] * 8 + [1] * 4 + [2] * 2 + [3])
+    prior = kind.bincount() / len(kind)
+    if weighted:
+        balance = Balance(factors, torch.log(factors))
+    else:
+        kind = kind.repeat_interleave(factors[kind].long())
+        balance = Balance(torch.ones(4), torch.log(factors))
+    logits = torch.log(prior).expand(len(kind), 4).clone().requires_grad_()
+    command_loss(logits, kind, balance=balance, of=len(kind)).backward()
+    assert logits.grad is not None
+    assert logits.grad.sum(0).tolist() == pytest.approx([0.0] * 4, abs=1e-6)

@@ -1,14 +1,19 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 import torch
+from tests.situations import situations
+from torch import Tensor
 
-from teamclone.models.config import ACTIVATIONS, ModelConfig
+from teamclone.models.config import ACTIVATIONS, BLOCKS, ModelConfig
 from teamclone.models.network import Clone, parameter_count
 from teamclone.models.state import CHANNEL, State, Target
+from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
 from teamclone.rcss.player_types import FIELDS
+from teamclone.training.config import load_config
 
 
 @pytest.fixture(autouse=True)
@@ -82,3 +87,142 @@ def test_overfits_sixty_four_samples() -> None:
     prediction = model(state)
     assert torch.equal(prediction.logits.argmax(1), kind)
     assert loss.parameters.item() < 1e-3
+
+
+RELATIVE = ModelConfig(
+    features="relative",
+    blocks=("self", "role", "type", "ball", "reach", "lines"),
+    kick_blocks=("self", "last", "ball", "mates", "opponents"),
+    aims=4,
+    aim_hidden=(32,),
+    kick_hidden=(64,),
+    hidden=(128, 64),
+    head="mixture",
+)
+SMALL = replace(RELATIVE, hidden=(16,), kick_hidden=(16,), aim_hidden=(8,))
+MODELS = {
+    "mixture": SMALL,
+    "no aims": replace(SMALL, aims=0, aim_hidden=()),
+    "one aim": replace(SMALL, aims=1),
+    "no kick blocks": replace(SMALL, kick_blocks=()),
+    "no role": replace(SMALL, blocks=("ball",)),
+    "point": replace(SMALL, head="point", kick_blocks=(), kick_hidden=()),
+    "past": replace(SMALL, blocks=("self", "past")),
+    "all": replace(SMALL, blocks=BLOCKS, kick_blocks=BLOCKS, dropout=0.2),
+}
+
+
+@pytest.mark.parametrize("config", MODELS.values(), ids=MODELS)
+def test_relative_models_answer_alike_alone_and_in_batches(config: ModelConfig) -> None:
+    model = Clone(config).eval()
+    state = situations(17, history=model.inputs.history)
+    model.inputs.fit([model.inputs.project(state)])
+    probabilities, parameters = model.predict(state)
+    assert probabilities.sum(1).tolist() == pytest.approx([1] * 17)
+    assert parameters.isfinite().all()
+    limits = torch.tensor([100.0, 180.0, 180.0, 100.0, 180.0, 180.0])
+    assert (parameters.abs() <= limits + 1e-3).all()
+    if config.head == "mixture":
+        assert (parameters[:, [0, 3]] >= 0).all()
+    for rows in (slice(0, 1), slice(16, 17), slice(4, 7)):
+        part = model.predict(State(*(tensor[rows] for tensor in state)))
+        for one, whole in zip(part, (probabilities, parameters), strict=True):
+            assert torch.allclose(one, whole[rows], atol=1e-2, rtol=1e-3)
+
+
+def test_kicks_are_decided_on_their_own_blocks() -> None:
+    model = Clone(SMALL)
+    state = situations(20)
+    model.inputs.fit([model.inputs.project(state)])
+    other = state._replace(players=state.players.clone())
+    # What he did last is among the blocks of a kick only, whom he can see among none.
+    other.players[..., CHANNEL["last_command"]] = (state.players[..., CHANNEL["last_command"]] + 1) % 5
+    other.players[..., CHANNEL["neck"]] += 20
+    (logits, before), (other_logits, after) = model(state), model(other)
+    assert torch.equal(logits, other_logits)
+    assert torch.equal(before[:, :3], after[:, :3])
+    assert not torch.equal(before[:, 3:5], after[:, 3:5])
+    assert not torch.equal(model.output(state).tackle_direction, model.output(other).tackle_direction)
+
+
+def test_dropout_is_for_training_only() -> None:
+    model = Clone(replace(SMALL, dropout=0.5))
+    state = situations(5)
+    assert not torch.equal(model(state).logits, model(state).logits)
+    model.eval()
+    assert torch.equal(model(state).logits, model(state).logits)
+
+
+def likely_target(state: State) -> Target:
+    """Commands as agents of the league give them: powers at their bound, clipped turns, directions in steps."""
+    n = len(state.ball)
+    kind = torch.arange(n) % 4
+    power = torch.where(torch.rand(n) < 0.5, 100.0, torch.rand(n) * 99)
+    moment = (torch.rand(n) * 400 - 200).clamp(-180, 180)
+    direction = torch.rand(n) * 360 - 180
+    first = torch.stack([power, moment, power, (direction / 9).round() * 9], 1)
+    second = torch.stack([(direction / 15).round() * 15, torch.zeros(n), direction, torch.zeros(n)], 1)
+    both = torch.stack([first, second], 2)
+    return Target(kind, both[torch.arange(n), kind])
+
+
+def test_a_mixture_overfits_sixty_four_samples() -> None:
+    model = Clone(RELATIVE)
+    state = situations(64)
+    target = likely_target(state)
+    model.inputs.fit([model.inputs.project(state)])
+    inputs = model.features(state)
+    optimiser = torch.optim.Adam(model.parameters(), lr=5e-3)
+    likelihoods = []
+    for _ in range(120):
+        loss = model.head.loss(model.answer(inputs), target)
+        optimiser.zero_grad()
+        loss.total.backward()
+        optimiser.step()
+        likelihoods.append(-loss.parameters.item())
+    assert likelihoods[-1] > likelihoods[0] + 4
+    with torch.no_grad():
+        prediction = model(state)
+    assert torch.equal(prediction.logits.argmax(1), target.kind)
+    away = []
+    for parameter, values in zip(PARAMETERS, prediction.parameters.T, strict=True):
+        rows = target.kind == CLONED_KINDS.index(parameter.kind)
+        error = values[rows] - target.parameters[rows, parameter.argument]
+        error = torch.remainder(error + 180, 360) - 180 if parameter.angle else error
+        away.append(float(error.abs().median()))
+    # Directions of dashes and tackles are classes; the others come near.
+    assert away == pytest.approx([0, 0, 0, 0, 0, 0], abs=5)
+    assert (away[1], away[5]) == pytest.approx((0, 0), abs=1e-3)
+
+
+def test_every_weight_of_the_mixture_learns() -> None:
+    model = Clone(RELATIVE)
+    state = situations(64)
+    model.inputs.fit([model.inputs.project(state)])
+    model.head.loss(model.output(state), likely_target(state)).total.backward()
+    for name, weights in model.named_parameters():
+        assert weights.grad is not None, name
+        assert weights.grad.isfinite().all(), name
+        assert weights.grad.abs().max() > 0, name
+
+
+class Trunk(torch.nn.Module):
+    """From the tensors of a state to what the head decides on."""
+
+    def __init__(self, model: Clone) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> tuple[Tensor, ...]:
+        state = State.now(ball=ball, players=players, types=types, actor=actor)
+        return tuple(self.model.trunk(self.model.features(state)))
+
+
+def test_the_preset_best_can_be_exported_for_any_batch() -> None:
+    trunk = Trunk(Clone(load_config("best").model).eval())
+    batch = torch.export.Dim("batch", min=1)
+    exported = torch.export.export(trunk, situations(3)[:4], dynamic_shapes=({0: batch},) * 4).module()
+    for n in (1, 3, 17):
+        state = situations(n, seed=n)
+        for one, other in zip(exported(*state[:4]), trunk(*state[:4]), strict=True):
+            assert torch.allclose(one, other, atol=1e-4)

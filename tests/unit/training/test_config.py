@@ -141,6 +141,65 @@ def test_a_setting_without_effect_is_refused() -> None:
         load_config("small", ["train.optimiser=rmsprop", "train.betas=[0.8, 0.9]"])
 
 
+MIXTURE = ["model.head=mixture", "model.kick_hidden=[8]"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "answer"),
+    [
+        (
+            ["train.optimiser=adagrad", "train.weight_decay=0.1"],
+            "train.weight_decay has no effect with train.optimiser",
+        ),
+        (["model.blocks=self"], "model.blocks has no effect with model.features = paper"),
+        (["model.kick_blocks=self"], "model.kick_blocks has no effect with model.features = paper"),
+        (["model.aims=2"], "model.aims has no effect with model.features = paper"),
+        (["model.aim_hidden=[8]"], "model.aim_hidden has no effect with model.features = paper"),
+        (["model.kick_hidden=[8]"], "model.kick_hidden has no effect with model.features = paper"),
+        (["model.head=mixture"], "model.head = mixture needs model.features = relative"),
+        (["model.features=relative", "model.own_type=true"], "model.own_type has no effect with model.features = rel"),
+        (
+            ["model.features=relative", "model.all_types=kick"],
+            "model.all_types has no effect with model.features = rel",
+        ),
+        (["model.features=relative", "model.aims=2"], "model.aims and model.aim_hidden need each other"),
+        (["model.features=relative", "model.aim_hidden=[8]"], "model.aims and model.aim_hidden need each other"),
+        (
+            ["model.features=relative", "model.kick_blocks=self"],
+            "model.kick_blocks has no effect with model.head = poi",
+        ),
+        (
+            ["model.features=relative", "model.kick_hidden=[8]"],
+            "model.kick_hidden has no effect with model.head = poin",
+        ),
+        (["model.features=relative", "model.head=mixture"], "model.head = mixture needs model.kick_hidden"),
+        (
+            ["model.features=relative", *MIXTURE, "train.parameter_loss=masked"],
+            "train.parameter_loss has no effect with model.head = mixture",
+        ),
+    ],
+)
+def test_useless_and_lacking_combinations_are_refused(settings: list[str], answer: str) -> None:
+    with pytest.raises(UsageError) as error:
+        load_config("paper", settings)
+    assert answer in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        [],
+        ["model.blocks=self"],
+        ["model.aims=2", "model.aim_hidden=[8]"],
+        ["train.parameter_loss=masked"],
+        MIXTURE,
+        [*MIXTURE, "model.kick_blocks=self,ball", "model.aims=1", "model.aim_hidden=8"],
+    ],
+)
+def test_combinations_that_go_together(settings: list[str]) -> None:
+    assert load_config("paper", ["model.features=relative", *settings]).model.features == "relative"
+
+
 def test_unknown_presets_and_sections() -> None:
     with pytest.raises(UsageError, match=r"no preset 'papr'; did you mean paper\?"):
         load_config("papr")

@@ -19,9 +19,10 @@ from teamclone.errors import DatasetError
 from teamclone.logs import read_match
 from teamclone.models.config import ModelConfig
 from teamclone.models.features import PaperFeatures
+from teamclone.models.mirror import mirror_state, mirror_target
 from teamclone.models.network import Clone
 from teamclone.store import create_store
-from teamclone.training.feed import Feed
+from teamclone.training.feed import Feed, counterparts
 from teamclone.training.gather import Gather
 from teamclone.training.group import ALONE, Group
 from teamclone.training.loop import answer
@@ -42,7 +43,7 @@ def real(tmp_path_factory: pytest.TempPathFactory, samples_dir: Path) -> Dataset
     store = create_store(folder / "store")
     for log in sorted(samples_dir.glob("*YuShan2024*.rcg.xz")):
         store.add(read_match(log))
-    build_dataset(DatasetConfig(team="HELIOS_base"), store=store, out=folder / "ds", jobs=1)
+    build_dataset(DatasetConfig(teams=("HELIOS_base",)), store=store, out=folder / "ds", jobs=1)
     return open_dataset(folder / "ds")
 
 
@@ -54,7 +55,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 def fitted(dataset: Dataset, config: ModelConfig) -> Clone:
     torch.manual_seed(0)
     model = Clone(config)
-    model.inputs.fit([model.inputs.project(dataset.state(np.arange(len(dataset))))])
+    state = dataset.state(np.arange(len(dataset)), history=model.inputs.history)
+    model.inputs.fit([model.inputs.project(state)])
     return model
 
 
@@ -118,11 +120,11 @@ class OtherFeatures(PaperFeatures):
 
 
 def as_on_a_card(feed: Feed) -> None:
-    feed.on_card, feed.gather = True, None
+    feed.on_card, feed.quick, feed.ahead = True, False, False
 
 
 def with_other_features(feed: Feed) -> None:
-    feed.gather = None
+    feed.quick = False
 
 
 @pytest.mark.parametrize("way", [lambda feed: None, as_on_a_card, with_other_features])
@@ -153,6 +155,81 @@ def test_other_features_are_asked_themselves(made: Dataset) -> None:
     model.features.load_state_dict(fitted(made, CONFIGS[0]).features.state_dict())
     (batch,) = Feed(made, model, CPU, ALONE).batches(rows, 9)
     assert torch.equal(batch.inputs, 2 * plain)
+
+
+RELATIVE = ModelConfig(features="relative", blocks=("self", "role", "ball", "mates", "past"))
+
+
+@pytest.mark.parametrize("config", [CONFIGS[0], RELATIVE])
+@pytest.mark.parametrize(("kept", "ahead"), [(0, True), (1, True), (2, False)])
+@pytest.mark.parametrize("size", [1, 2])
+def test_mirrored_samples_among_others(made: Dataset, config: ModelConfig, kept: int, ahead: bool, size: int) -> None:
+    """With nothing kept, with the plain inputs kept, and with those and the mirrored."""
+    model = fitted(made, config)
+    rows = np.random.default_rng(0).permutation(len(made))
+    training, order = rows[:700], rows[:101]
+    turned = np.random.default_rng(1).random(101) < 0.4
+    table = 4 * len(model.inputs.names)
+    told: list[tuple[int, int]] = []
+    feeds = [
+        Feed(
+            made,
+            model,
+            CPU,
+            Group(rank=rank, size=size),
+            keep_bytes=(0, table * 800, table * 1500)[kept],
+            rows=rows[:800],
+            mirrored=training,
+            on_progress=lambda *done: told.append(done),
+        )
+        for rank in range(size)
+    ]
+    assert {feed.ahead for feed in feeds} == {ahead}
+    assert (told[-1] if told else None) == (None, (800, 800), (1500, 1500))[kept]
+    places = counterparts(made, training)
+    for number, shares in enumerate(
+        zip(*(list(feed.batches(order, 25, mirrored=turned)) for feed in feeds), strict=True)
+    ):
+        part = slice(25 * number, 25 * number + 25)
+        for rank, share in enumerate(shares):
+            mine, mirrored = order[part][rank::size], torch.from_numpy(turned[part][rank::size])
+            plain, other = made.state(mine, history=model.inputs.history), made.target(mine)
+            expected = torch.where(
+                mirrored[:, None], model.features(mirror_state(plain, places)), model.features(plain)
+            )
+            assert torch.allclose(share.inputs, expected, rtol=1e-5, atol=1e-6)
+            parameters = torch.where(mirrored[:, None], mirror_target(other).parameters, other.parameters)
+            assert torch.equal(share.target.parameters, parameters)
+            assert torch.equal(share.target.kind, other.kind)
+            assert torch.equal(share.whole, made.target(order[part]).kind)
+
+
+def test_kept_inputs_are_those_made_anew(made: Dataset) -> None:
+    """But for rounding, which hangs on how many are made at once."""
+    model = fitted(made, RELATIVE)
+    rows = np.random.default_rng(0).permutation(len(made))
+    kept = Feed(made, model, CPU, ALONE, keep_bytes=1e9, rows=rows[:500])
+    anew = Feed(made, model, CPU, ALONE, keep_bytes=0, rows=rows[:500])
+    assert (kept.ahead, anew.ahead) == (False, True)
+    for one, other in zip(kept.batches(rows[:300], 77), anew.batches(rows[:300], 77), strict=True):
+        assert torch.allclose(one.inputs, other.inputs, rtol=1e-5, atol=1e-6)
+    one, other = (torch.cat(list(feed.columns(rows[:300]))) for feed in (kept, anew))
+    assert torch.allclose(one, other, rtol=1e-5, atol=1e-6)
+
+
+def test_counterparts_follow_from_where_players_stand(made: Dataset, tmp_path: Path) -> None:
+    """Players off the field do not count; the made team stands anywhere, so it is put in its places."""
+    position = made.frames["position"].numpy().copy()
+    detail = made.frames["detail"].numpy().copy()
+    aside = np.array([0, -20, 20, -8, 8, 0, 0, 0, 0, 0, 0], np.float32)
+    position[:, :11] = np.stack([np.linspace(-50, 20, 11) // 10 * 10 * (aside == 0), aside], -1)
+    # Number 2 is carried off for half of the frames, to the bench of number 5's side.
+    position[60:, 1] = (0, 40)
+    detail[60:, 1, [channel.name for channel in DETAIL_CHANNELS].index("flags")] = 0
+    placed = open_dataset(
+        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/position": position, "frames/detail": detail})
+    )
+    assert counterparts(placed, np.arange(len(placed)))[:5].tolist() == [0, 2, 1, 4, 3]
 
 
 @pytest.mark.parametrize("activation", ["relu", "gelu", "silu", "tanh"])

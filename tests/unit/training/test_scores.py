@@ -16,20 +16,20 @@ def test_figures_by_hand_over_unequal_batches() -> None:
     one_hot = torch.eye(4)
     # Truth dash, dash, turn; said dash, kick, turn. Dash power predicted 100 for 50, else zeros.
     scores.add(
-        Loss(torch.tensor(0.0), torch.tensor(0.3), torch.tensor(0.06)),
+        Loss(torch.tensor(0.33), torch.tensor(0.3), torch.tensor(0.06)),
         Prediction(one_hot[[0, 2, 1]], torch.tensor([[100.0, 0, 0, 0, 0, 0], [0.0] * 6, [0.0] * 6])),
         Target(torch.tensor([0, 0, 1]), torch.tensor([[50.0, 0.0], [0.0, 90.0], [0.0, 0.0]])),
     )
     # Truth kick; said kick, but with a turn moment of 36 degrees that was not issued.
     scores.add(
-        Loss(torch.tensor(0.0), torch.tensor(0.7), torch.tensor(0.02)),
+        Loss(torch.tensor(0.71), torch.tensor(0.7), torch.tensor(0.02)),
         Prediction(one_hot[[2]], torch.tensor([[0.0, 0, 36, 0, 0, 0]])),
         Target(torch.tensor([2]), torch.tensor([[20.0, 0.0]])),
     )
     table = scores.table()
     assert table == pytest.approx(
         {
-            "loss": (3 * 0.36 + 0.72) / 4,
+            "loss": (3 * 0.33 + 0.71) / 4,
             "cross_entropy": (3 * 0.3 + 0.7) / 4,
             "parameter_loss": (3 * 0.06 + 0.02) / 4,
             "accuracy": 3 / 4,

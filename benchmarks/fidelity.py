@@ -1,0 +1,666 @@
+"""How faithful a clone is: baselines, presets, what each part gains, and why it stops; then writes the results page.
+
+    python benchmarks/fidelity.py MATCHES --out DIR [--only c,b,a,f,d,e,g] [--page docs/fidelity.md]
+
+MATCHES is a folder of logs. Steps, in the order in which --only names them:
+
+    c  preset best, three seeds          f  learning curve over 1, 2, 5, 10 and all training matches
+    b  preset paper, eight minutes       d  preset best without each of its parts, on a shorter schedule
+    a  rules, gradient-boosted trees     e  remedies for rare commands, on the same shorter schedule
+                                         g  what is left: from the results of c and f
+
+--only also takes single results by name. Each result is a file DIR/results/NAME.json; what is there is not done again,
+and a training that was interrupted goes on. The page is written anew at the end from the results that there are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import re
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import fidelity_page
+import numpy as np
+import torch
+from measure import cost_of
+from numpy.typing import NDArray
+
+import teamclone
+from teamclone.dataset.layout import Split
+from teamclone.dataset.reader import open_dataset
+from teamclone.dataset.write import write_dataset
+from teamclone.errors import TeamcloneError
+from teamclone.evaluation import baselines, metrics
+from teamclone.evaluation.evaluate import KINDS, count_training, describe, predict, truth, write_json
+from teamclone.evaluation.outcome import Outcome
+from teamclone.models.config import BLOCKS
+from teamclone.models.network import parameter_count
+from teamclone.models.physics import kickable_area, reach_ball
+from teamclone.models.relative import RelativeFeatures
+from teamclone.models.state import CHANNEL, State
+from teamclone.rcss.commands import PARAMETERS
+from teamclone.training.config import Config, config_from, load_config, to_table
+from teamclone.training.run import is_run, open_run
+
+FORMAT = 1
+"""Of the result files; raised whenever they would be misread."""
+TEST_MATCHES = ("20261122110359", "20261122112951")
+STEPS = "cbafdeg"
+SEEDS = (0, 1, 2)
+PAPER_MINUTES = 8.0
+SHORT_EPOCHS = 6
+"""Of the schedule on which variants are compared."""
+CURVE = (1, 2, 5, 10)
+TREE_ROWS = 200_000
+TREE_ITERATIONS = 200
+CHUNK = 16384
+"""Rows whose states are made at once; bounds memory."""
+SURE = 0.8
+"""Confidence from which an error that all seeds make counts as systematic."""
+
+REMEDIES: dict[str, tuple[str, ...]] = {
+    "oversample": ("train.balance=oversample", "train.balance_strength=0.5"),
+    "undersample": ("train.balance=undersample", "train.balance_strength=0.5"),
+    "weights": ("train.balance=weights", "train.balance_strength=0.5"),
+    "weights-uncorrected": (
+        "train.balance=weights",
+        "train.balance_strength=0.5",
+        "train.prior_correction=false",
+    ),
+    "mirror": ("data.mirror=0.5",),
+    "ensemble": ("model.members=3",),
+    "without-temperature": ("train.calibrate=false",),
+}
+"""What is said to help with rare commands: name and settings beside those of the short schedule."""
+
+TINY = (
+    *("data.batch_size=512", "data.batches_per_epoch=4", "data.validation_batches=2", "model.hidden=[32]"),
+    "train.epochs=1",
+)
+"""Settings of --quick, for the paper's network too."""
+TINY_RELATIVE = ("model.kick_hidden=[16]", "model.aim_hidden=[32]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """One training: its result's name, the step it belongs to, and what it is trained with.
+
+    Attributes:
+        preset: settings to start from. overrides: those changed.
+        matches: how many training matches; None for all.
+    """
+
+    name: str
+    step: str
+    preset: str
+    overrides: tuple[str, ...]
+    matches: int | None = None
+
+
+def without(blocks: Sequence[str], *names: str) -> str:
+    return ",".join(block for block in blocks if block not in names)
+
+
+def ablations() -> dict[str, tuple[str, ...]]:
+    """Preset best without each of its parts, and with those it leaves out: name and settings."""
+    model = load_config("best").model
+    found: dict[str, tuple[str, ...]] = {}
+    for block in dict.fromkeys((*model.blocks, *model.kick_blocks)):
+        found[f"without-{block}"] = tuple(
+            f"model.{name}={without(getattr(model, name), block)}"
+            for name in ("blocks", "kick_blocks")
+            if block in getattr(model, name)
+        )
+    for block in ("view", "past"):
+        if block not in model.blocks:
+            found[f"with-{block}"] = (f"model.blocks={','.join((*model.blocks, block))}",)
+    found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]")
+    found["point-head"] = (
+        *("model.head=point", "model.kick_blocks=[]", "model.kick_hidden=[]"),
+        *("train.parameter_loss=masked", "train.parameter_weight=1.0"),
+    )
+    found["gelu" if model.activation != "gelu" else "relu"] = (
+        f"model.activation={'gelu' if model.activation != 'gelu' else 'relu'}",
+    )
+    return found
+
+
+def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -> list[Experiment]:
+    """All trainings, for so many training matches.
+
+    Args:
+        scale: of all lengths, minutes and epochs. short_epochs: before scaling. quick: tiny networks, an epoch each.
+    """
+    tiny = (*TINY, *TINY_RELATIVE) if quick else ()
+
+    def epochs(count: float) -> tuple[str, ...]:
+        return () if quick else (f"train.epochs={max(1, round(count * scale))}",)
+
+    usual = load_config("best").train.epochs
+    made = [
+        Experiment(
+            name=f"best-{seed}",
+            step="c",
+            preset="best",
+            overrides=(*tiny, *(epochs(usual) if scale != 1 else ()), f"train.seed={seed}"),
+        )
+        for seed in SEEDS
+    ]
+    minutes = (f"train.max_minutes={PAPER_MINUTES * scale:g}",)
+    made.append(Experiment(name="paper", step="b", preset="paper", overrides=TINY if quick else minutes))
+    for count in (count for count in CURVE if count < n_train):
+        # Half way between as many passes and as many steps as with all matches.
+        longer = epochs(short_epochs * (n_train / count) ** 0.5)
+        made.append(
+            Experiment(name=f"curve-{count}", step="f", preset="best", overrides=(*tiny, *longer), matches=count)
+        )
+    short = (*tiny, *epochs(short_epochs))
+    # Beside which the others of d and e stand, and the last point of f.
+    made.append(Experiment(name="short", step="def", preset="best", overrides=short))
+    for step, variants in (("d", ablations()), ("e", REMEDIES)):
+        made += [
+            Experiment(name=name, step=step, preset="best", overrides=(*short, *changes))
+            for name, changes in variants.items()
+        ]
+    return made
+
+
+class Work:
+    """The folder of a benchmark, its dataset, and what is done with it."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.out: Path = options.out
+        (self.out / "results").mkdir(parents=True, exist_ok=True)
+        (self.out / "answers").mkdir(exist_ok=True)
+        self.commands: list[list[str]] = []
+        self._prepare()
+
+    def teamclone(self, *arguments: object) -> list[str]:
+        return [sys.executable, "-m", "teamclone", *map(str, arguments)]
+
+    def _prepare(self) -> None:
+        """The store and the dataset, if they are not there."""
+        options, store, folder = self.options, self.out / "store", self.out / "dataset"
+        split = [part for match in options.test_match for part in ("--test-match", match)]
+        unseen = [part for name in options.unseen for part in ("--unseen", name)]
+        ingest = self.teamclone("ingest", options.matches, "--store", store)
+        build = self.teamclone(
+            *("dataset", "--store", store, "--team", options.team, *unseen),
+            *("--commands", "received", *split, "--out", folder),
+        )
+        self.commands += [ingest, build]
+        if not folder.is_dir():
+            cost_of(*ingest)
+            cost_of(*build)
+        self.dataset = open_dataset(folder)
+        wanted, made = list(options.test_match), list(self.dataset.meta["options"]["test_matches"])
+        if wanted != made:
+            sys.exit(f"{folder}: made with the test matches {made}, got {wanted}; choose another --out")
+        self.rows = np.concatenate([self.dataset.split(split) for split in (Split.TEST, Split.UNSEEN)])
+        if not len(self.rows):
+            sys.exit(f"{folder}: no test and no unseen matches; give more matches")
+
+    @cached_property
+    def counted(self) -> baselines.Baselines:
+        return count_training(self.dataset)
+
+    @cached_property
+    def training_matches(self) -> list[int]:
+        """Indices of the training matches, opponents taking turns, those with most matches first."""
+        by_opponent: dict[str, list[int]] = {}
+        used = np.unique(self.dataset.match(self.dataset.split(Split.TRAIN)).numpy())
+        for index in used.tolist():
+            by_opponent.setdefault(self.dataset.matches[index]["opponent"], []).append(index)
+        turns = [
+            (turn, -len(found), name, index) for name, found in by_opponent.items() for turn, index in enumerate(found)
+        ]
+        return [index for *_, index in sorted(turns)]
+
+    @cached_property
+    def sets(self) -> dict[str, NDArray[np.bool_]]:
+        """Masks of ``rows``: the test matches by opponent, and the unseen opponents' matches together."""
+        split = self.dataset.samples["split"].numpy()[self.rows]
+        match = self.dataset.match(self.rows).numpy()
+        opponent = np.array([row["opponent"] for row in self.dataset.matches], object)[match]
+        found = {
+            f"test {name}": (split == Split.TEST) & (opponent == name)
+            for name in sorted(set(opponent[split == Split.TEST]), reverse=True)
+        }
+        if (split == Split.UNSEEN).any():
+            found["unseen"] = split == Split.UNSEEN
+        return found
+
+    @cached_property
+    def columns(self) -> tuple[RelativeFeatures, torch.Tensor]:
+        """All blocks of inputs of ``rows``, (n, columns): they cost more than a network's answers, so once for all."""
+        features = RelativeFeatures(BLOCKS)
+        made = torch.empty(len(self.rows), len(features.names))
+        start = 0
+        for part in chunks(self.rows):
+            made[start : start + len(part)] = features.project(self.dataset.state(part, history=features.history))
+            start += len(part)
+        return features, made
+
+    def inputs_of(self, features: RelativeFeatures) -> torch.Tensor:
+        """(n, columns) what features of some blocks project of ``rows``."""
+        everything, made = self.columns
+        place = {name: index for index, name in enumerate(everything.names)}
+        return made[:, [place[name] for name in features.names]]
+
+    def figures(self, outcome: Outcome) -> dict[str, Any]:
+        """Of all sets: ``all`` field players, and ``2-11`` of them by number."""
+        numbered = self.dataset.samples["player"].numpy()[self.rows] >= 1
+        return {
+            name: {
+                who: self._section(outcome.rows(mask & chosen))
+                for who, chosen in (("all", np.ones_like(numbered)), ("2-11", numbered))
+            }
+            for name, mask in self.sets.items()
+        }
+
+    def _section(self, outcome: Outcome) -> dict[str, Any]:
+        section = describe(outcome, baselines=self.counted, matches=self.dataset.matches)
+        kept = {key: section[key] for key in ("rows", "model", "commands", "parameters", "confusion")}
+        return {**kept, "matches": len(section["matches"])}
+
+    def subset(self, count: int) -> Path:
+        """A dataset whose training matches are the first so many, with the same validation matches."""
+        folder = self.out / f"dataset-{count}"
+        if folder.is_dir():
+            return folder
+        data, kept = self.dataset, self.training_matches[:count]
+        split, match = data.samples["split"].numpy(), data.match(np.arange(len(data))).numpy()
+        rows = np.flatnonzero((split == Split.VALIDATION) | ((split == Split.TRAIN) & np.isin(match, kept)))
+        names = ("team", "options", "matches")
+        return write_dataset(
+            folder,
+            frames={name: array.numpy() for name, array in data.frames.items()},
+            samples={name: array.numpy()[rows] for name, array in data.samples.items()},
+            player_types=data.player_types.numpy(),
+            meta={name: data.meta[name] for name in names if name in data.meta},
+        )
+
+    def result(self, name: str, settings: dict[str, Any], make: Callable[[], dict[str, Any]]) -> None:
+        """Make a result that is not there.
+
+        Raises:
+            SystemExit: it is there, of other settings.
+        """
+        path = self.out / "results" / f"{name}.json"
+        head = {"format": FORMAT, "name": name, "settings": {**settings, "dataset": self.dataset.id}}
+        if path.is_file():
+            found = json.loads(path.read_text(encoding="utf-8"))
+            if found.get("format") != FORMAT or _whole(found.get("settings", {})) != _whole(head["settings"]):
+                sys.exit(
+                    f"{path}: made with other settings ({found.get('settings')}, now {head['settings']}); "
+                    "remove it, or choose another --out"
+                )
+            print(f"{name}: done before", file=sys.stderr)
+            return
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        machine = {
+            "processor": _processor(),
+            "threads": torch.get_num_threads(),
+            "python": platform.python_version(),
+            "torch": torch.__version__,
+            "numpy": np.__version__,
+            "teamclone": teamclone.__version__,
+        }
+        write_json(path, {**head, **make(), "machine": machine})
+
+    def load(self) -> dict[str, dict[str, Any]]:
+        """All results by name."""
+        found = {}
+        for path in sorted((self.out / "results").glob("[!.]*.json")):
+            result = json.loads(path.read_text(encoding="utf-8"))
+            if result["format"] != FORMAT:
+                sys.exit(f"{path}: format {result['format']}, this version reads {FORMAT}; remove it")
+            found[result["name"]] = result
+        return found
+
+    def train(self, experiment: Experiment) -> dict[str, Any]:
+        """Train, answer and measure."""
+        folder = self.out / "runs" / experiment.name
+        data = self.out / "dataset" if experiment.matches is None else self.subset(experiment.matches)
+        config = load_config(experiment.preset, experiment.overrides)
+        sets = [part for setting in experiment.overrides for part in ("--set", setting)]
+        command = self.teamclone("train", data, "--preset", experiment.preset, *sets, "--out", folder)
+        ended = self.out / "runs" / f"{experiment.name}.json"
+        if not ended.is_file() or not _is_of(folder, config, data):
+            ended.unlink(missing_ok=True)
+            before = 0.0
+            # A resumed run would count its minutes afresh.
+            if config.train.max_minutes or not _is_of(folder, config, data):
+                shutil.rmtree(folder, ignore_errors=True)
+            if is_run(folder):
+                before = sum(record["seconds"] for record in open_run(folder).history())
+                cost = cost_of(*self.teamclone("train", data, "--out", folder, "--resume"))
+            else:
+                cost = cost_of(*command)
+            write_json(ended, {"seconds": before + cost.wall, "peak_bytes": cost.peak})
+        run = open_run(folder)
+        model = run.load_model()
+        inputs = self.inputs_of(model.features) if isinstance(model.features, RelativeFeatures) else None
+        outcome = predict(model, self.dataset, self.rows, inputs=inputs)
+        if experiment.step == "c":
+            np.savez(self.out / "answers" / f"{experiment.name}.npz", probabilities=outcome.probabilities)
+        best = {row.checkpoint: row.epoch for row in run.best()}
+        return {
+            **json.loads(ended.read_text(encoding="utf-8")),
+            "command": self.told(command),
+            "epochs": len(run.history()),
+            "best_epoch": best.get("best-loss"),
+            "weights": parameter_count(model),
+            "training_matches": experiment.matches or len(self.training_matches),
+            "sets": self.figures(outcome),
+        }
+
+    def told(self, command: Sequence[str]) -> str:
+        """A command as a person types it, on MATCHES and with results in DIR."""
+        text = " ".join(command).replace(f"{sys.executable} -m teamclone", "teamclone")
+        return text.replace(str(self.options.matches), "MATCHES").replace(str(self.out), "DIR")
+
+    def bare(self) -> Outcome:
+        """What happened in ``rows``, with even probabilities as answers."""
+        kind, issued, last = truth(self.dataset, self.rows)
+        n = len(self.rows)
+        return Outcome(
+            probabilities=np.full((n, len(KINDS)), 1 / len(KINDS), np.float32),
+            parameters=np.zeros((n, len(PARAMETERS)), np.float32),
+            parameter_log_loss=np.full(n, np.nan, np.float32),
+            kind=kind,
+            issued=issued,
+            last=last,
+            match=self.dataset.match(self.rows).numpy(),
+            position=np.zeros((n, 2), np.float32),
+        )
+
+    def rule(self, name: str) -> dict[str, Any]:
+        return {"sets": self.figures(self.counted.answer(name, self.bare()))}
+
+    def tree(self, *, rows: int, iterations: int) -> dict[str, Any]:
+        """Gradient-boosted trees on the columns of preset best, stopped by the validation matches."""
+        from sklearn.ensemble import HistGradientBoostingClassifier
+
+        model = load_config("best").model
+        features = RelativeFeatures(tuple({*model.blocks, *model.kick_blocks}))
+
+        def columns(index: NDArray[np.int64]) -> NDArray[np.float32]:
+            parts = [self._columns(features, part) for part in chunks(index)]
+            return np.concatenate(parts)
+
+        def spread(split: Split, most: int) -> NDArray[np.int64]:
+            index = self.dataset.split(split)
+            return index[np.linspace(0, len(index) - 1, min(most, len(index))).astype(np.int64)]
+
+        trained, held = spread(Split.TRAIN, rows), spread(Split.VALIDATION, rows // 4)
+        classifier = HistGradientBoostingClassifier(
+            learning_rate=0.1, max_iter=iterations, early_stopping=True, random_state=0
+        )
+        kinds = self.dataset.samples["kind"].numpy()
+        # What training never saw cannot be scored, and says nothing about when to stop.
+        held = held[np.isin(kinds[held], kinds[trained])]
+        began = time.perf_counter()
+        classifier.fit(columns(trained), kinds[trained], X_val=columns(held), y_val=kinds[held])
+        seconds = time.perf_counter() - began
+        bare = self.counted.answer("majority", self.bare())  # parameters: the constant guess
+        probabilities = np.zeros_like(bare.probabilities)
+        inputs = self.inputs_of(features)[:, : features.n_inputs].numpy()
+        probabilities[:, classifier.classes_] = classifier.predict_proba(inputs)
+        outcome = Outcome(**{**{name: getattr(bare, name) for name in bare.__slots__}, "probabilities": probabilities})
+        return {
+            "seconds": seconds,
+            "rows": len(trained),
+            "columns": features.n_inputs,
+            "iterations": int(classifier.n_iter_),
+            "sets": self.figures(outcome),
+        }
+
+    def _columns(self, features: RelativeFeatures, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        state = self.dataset.state(rows, history=features.history)
+        found: NDArray[np.float32] = features.project(state)[:, : features.n_inputs].numpy()
+        return found
+
+    def what_is_left(self, results: dict[str, dict[str, Any]]) -> dict[str, Any]:
+        """Why it stops: the seeds' agreement, where errors lie, and where the learning curve leads."""
+        found: dict[str, Any] = {}
+        curve = sorted(
+            (result["training_matches"], result)
+            for name, result in results.items()
+            if name.startswith("curve-") or name == "short"
+        )
+        if len(curve) > 3:
+            found["curve"] = {
+                name: learning_curve(
+                    [matches for matches, _ in curve],
+                    [result["sets"][name]["all"]["model"]["cross_entropy"]["value"] for _, result in curve],
+                )
+                for name in self.sets
+            }
+        files = [self.out / "answers" / f"{name}.npz" for name in results if name.startswith("best-")]
+        answers = [np.load(path)["probabilities"] for path in files if path.is_file()]
+        if len(answers) > 1:
+            bare, stacked = self.bare(), np.stack(answers)
+            where = np.concatenate([situations(self.dataset.state(part)) for part in chunks(self.rows)])
+            together = Outcome(
+                **{**{name: getattr(bare, name) for name in bare.__slots__}, "probabilities": stacked.mean(0)}
+            )
+            found["seeds"] = len(answers)
+            found["agreement"] = {
+                name: agreement(stacked[:, mask], bare.kind[mask]) for name, mask in self.sets.items()
+            }
+            found["situations"] = {
+                name: by_situation(stacked[:, mask], bare.kind[mask], where[mask]) for name, mask in self.sets.items()
+            }
+            found["ensemble"] = self.figures(together)
+        return found
+
+
+def _is_of(folder: Path, config: Config, data: Path) -> bool:
+    """Whether a run was begun with these settings on this dataset."""
+    if not is_run(folder):
+        return False
+    run = open_run(folder)
+    return run.config == config and run.dataset_id == open_dataset(data).id
+
+
+def _whole(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a result with defaults where it was made before a setting was known."""
+    config = settings.get("config")
+    return settings if config is None else {**settings, "config": to_table(config_from(config, where="a result"))}
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), platform.processor())
+
+
+def chunks(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    return (rows[start : start + CHUNK] for start in range(0, len(rows), CHUNK))
+
+
+SITUATIONS = ("ball kickable", "first of his team to the ball", "off the ball")
+
+
+def situations(state: State) -> NDArray[np.int64]:
+    """(batch,) index into SITUATIONS of the acting player; the ball is taken to roll on freely."""
+    actor = state.actor[:, None]
+    gap = (state.players[..., [CHANNEL["x"], CHANNEL["y"]]] - state.ball[:, None, :2]).norm(dim=2)
+    kickable = (gap <= kickable_area(state.types)).gather(1, actor)[:, 0]
+    free = torch.zeros(len(state.actor), dtype=torch.bool)
+    steps = reach_ball(state.ball, state.players, state.types, held=free, actor=state.actor).steps[:, :11]
+    first = steps.gather(1, actor)[:, 0] <= steps.amin(1)
+    found: NDArray[np.int64] = torch.where(kickable, 0, torch.where(first, 1, 2)).numpy()
+    return found
+
+
+def agreement(probabilities: NDArray[np.floating], kind: NDArray[np.int64]) -> dict[str, float]:
+    """Whether seeds make the same errors; the shares add up to 1 over all errors of all seeds.
+
+    Args:
+        probabilities: (seeds, n, 4). kind: (n,) what was given.
+
+    Returns:
+        ``error``: mean share of rows predicted wrong. ``systematic``: of the errors, those that all seeds make, sure
+        of them by SURE on average; ``shared``: made by all, less sure; ``by_seed``: by some only. ``entropy``: mean
+        entropy of the seeds' mean, nats; ``chance``: mean entropy of each; ``doubt``: their difference, on which the
+        seeds do not agree.
+    """
+    wrong = probabilities.argmax(2) != kind
+    everyone = wrong.all(0)
+    sure = probabilities.max(2).mean(0) >= SURE
+    total = max(int(wrong.sum()), 1)
+    n = len(wrong)
+    mean = probabilities.astype(np.float64).mean(0)
+    entropy, chance = _entropy(mean), float(np.mean([_entropy(one) for one in probabilities.astype(np.float64)]))
+    return {
+        "error": float(wrong.mean()),
+        "systematic": n * int((everyone & sure).sum()) / total,
+        "shared": n * int((everyone & ~sure).sum()) / total,
+        "by_seed": int(wrong[:, ~everyone].sum()) / total,
+        "entropy": entropy,
+        "chance": chance,
+        "doubt": entropy - chance,
+    }
+
+
+def _entropy(probabilities: NDArray[np.float64]) -> float:
+    return float(-(probabilities * np.log(np.clip(probabilities, 1e-12, 1.0))).sum(1).mean())
+
+
+def by_situation(
+    probabilities: NDArray[np.floating], kind: NDArray[np.int64], where: NDArray[np.int64]
+) -> dict[str, dict[str, float]]:
+    """Means over seeds by situation: rows, error, cross-entropy, and the shares of all rows, errors and nats there."""
+    wrong = (probabilities.argmax(2) != kind).mean(0)
+    nats = np.mean([metrics.log_loss(one, kind) for one in probabilities], axis=0)
+    found = {}
+    for index, name in enumerate(SITUATIONS):
+        here = where == index
+        if here.any():
+            found[name] = {
+                "rows": int(here.sum()),
+                "share": float(here.mean()),
+                "error": float(wrong[here].mean()),
+                "cross_entropy": float(nats[here].mean()),
+                "share_of_errors": float(wrong[here].sum() / max(wrong.sum(), 1e-12)),
+                "share_of_nats": float(nats[here].sum() / nats.sum()),
+            }
+    return found
+
+
+def power_law(matches: Sequence[float], loss: Sequence[float]) -> tuple[float, float, float]:
+    """Floor, scale and exponent of ``floor + scale * matches ** -exponent`` by least squares; none is below 0."""
+    x, y = np.asarray(matches, np.float64), np.asarray(loss, np.float64)
+    best = (np.inf, 0.0, 0.0, 0.0)
+    for exponent in np.geomspace(0.05, 3.0, 400):
+        falling = x**-exponent
+        design = np.stack([np.ones_like(x), falling], 1)
+        floor, scale = np.linalg.lstsq(design, y, rcond=None)[0]
+        if floor < 0:
+            floor, scale = 0.0, float(falling @ y / (falling @ falling))
+        if scale < 0:
+            floor, scale = float(y.mean()), 0.0
+        error = float(np.square(floor + scale * falling - y).sum())
+        if error < best[0]:
+            best = (error, float(floor), float(scale), float(exponent))
+    return best[1:]
+
+
+def learning_curve(matches: Sequence[int], loss: Sequence[float]) -> dict[str, Any]:
+    """The fit of `power_law`, its floor as each single point left out would have it, and where it leads."""
+    floor, scale, exponent = power_law(matches, loss)
+    left_out = [
+        power_law([*matches[:i], *matches[i + 1 :]], [*loss[:i], *loss[i + 1 :]])[0] for i in range(len(matches))
+    ]
+    return {
+        "matches": list(matches),
+        "cross_entropy": list(loss),
+        "floor": floor,
+        "scale": scale,
+        "exponent": exponent,
+        "floor_low": min(left_out),
+        "floor_high": max(left_out),
+        "leads_to": {str(n * matches[-1]): floor + scale * (n * matches[-1]) ** -exponent for n in (2, 10)},
+    }
+
+
+def parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    made.add_argument("matches", type=Path, help="folder of logs")
+    made.add_argument("--out", type=Path, required=True, help="folder of the benchmark")
+    made.add_argument("--only", default=",".join(STEPS), help="steps and results, in this order")
+    made.add_argument("--page", type=Path, help="the page to write, a plot beside it; default DIR/fidelity.md")
+    made.add_argument("--team", default="HELIOS_base")
+    made.add_argument("--unseen", nargs="*", default=["YuShan2024"], help="opponents kept out of training")
+    made.add_argument(
+        "--test-match", nargs="*", default=list(TEST_MATCHES), help="ids or parts of names; none: as the split gives"
+    )
+    made.add_argument("--minutes-scale", type=float, default=1.0, help="of all lengths: minutes and epochs")
+    made.add_argument("--short-epochs", type=int, default=SHORT_EPOCHS, help="of the schedule of d, e and f")
+    made.add_argument("--quick", action="store_true", help="tiny networks, an epoch each: to try the benchmark itself")
+    return made
+
+
+def main() -> None:
+    options = parser().parse_args()
+    work = Work(options)
+    n_train = len(work.training_matches)
+    trainings = experiments(
+        n_train=n_train, scale=options.minutes_scale, short_epochs=options.short_epochs, quick=options.quick
+    )
+    for experiment in trainings:  # a wrong setting is told before the hours of work
+        load_config(experiment.preset, experiment.overrides)
+    tree = {"rows": TREE_ROWS, "iterations": max(1, round(TREE_ITERATIONS * options.minutes_scale))}
+    tree = {"rows": 4000, "iterations": 3} if options.quick else tree
+    known = {*STEPS, *baselines.NAMES, "tree", *(experiment.name for experiment in trainings)}
+    wanted = [part for part in re.split(r"[,\s]+", options.only) if part]
+    wrong = [part for part in wanted if part not in known]
+    if wrong:
+        sys.exit(f"--only: no {', '.join(wrong)}; there are {', '.join(sorted(known))}")
+    for part in wanted:
+        for experiment in trainings:
+            if part in (*experiment.step, experiment.name):
+                config = to_table(load_config(experiment.preset, experiment.overrides))
+                settings = {"config": config, "matches": experiment.matches}
+                work.result(experiment.name, settings, lambda experiment=experiment: work.train(experiment))
+        for rule in baselines.NAMES:
+            if part in ("a", rule):
+                work.result(rule, {}, lambda rule=rule: work.rule(rule))
+        if part in ("a", "tree"):
+            work.result("tree", tree, lambda: work.tree(**tree))
+        if part == "g":
+            write_json(work.out / "left.json", work.what_is_left(work.load()))
+    left = work.out / "left.json"
+    page = options.page or work.out / "fidelity.md"
+    fidelity_page.write(
+        page,
+        results=work.load(),
+        left=json.loads(left.read_text(encoding="utf-8")) if left.is_file() else {},
+        variants={"d": ablations(), "e": REMEDIES},
+        cleaning=work.dataset.meta["cleaning"],
+        commands=[work.told(command) for command in work.commands],
+        situations=SITUATIONS,
+        sure=SURE,
+    )
+    print(page)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except TeamcloneError as error:
+        sys.exit(f"fidelity: {error}")

@@ -1,0 +1,497 @@
+"""The page of results that `fidelity.py` writes: every number is from its result files, what has none is left out."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
+
+from teamclone.evaluation.metrics import EVEN_LOG_LOSS
+from teamclone.files import write_atomic
+from teamclone.rcss.commands import CLONED_KINDS
+
+Results = Mapping[str, Mapping[str, Any]]
+NOTHING = "-"
+KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
+WIDTH = 138
+COLOURS = ("#1b6fb3", "#c46a12", "#1f9e78", "#c75b9b", "#5d6872")
+
+
+def _model(name: str) -> Callable[[Mapping[str, Any]], Any]:
+    return lambda section: section["model"][name]
+
+
+def _command(kind: str, name: str) -> Callable[[Mapping[str, Any]], Any]:
+    return lambda section: section["commands"][kind][name]
+
+
+def _parameter(parameter: str, name: str) -> Callable[[Mapping[str, Any]], Any]:
+    return lambda section: section["parameters"][parameter][name]
+
+
+FIGURES: tuple[tuple[str, Callable[[Mapping[str, Any]], Any], int, str], ...] = (
+    ("accuracy", _model("accuracy"), 3, ".93 / .925 / .91"),
+    ("cross-entropy, nats", _model("cross_entropy"), 3, ".18 / .19 / .22"),
+    ("calibration error (ECE)", _model("ece"), 4, "under .004"),
+    ("Brier score", _model("brier"), 3, ""),
+    ("kick, recall", _command("kick", "recall"), 2, ".98"),
+    ("kick, precision", _command("kick", "precision"), 2, ".93"),
+    ("tackle, recall", _command("tackle", "recall"), 2, ".5"),
+    ("tackle, precision", _command("tackle", "precision"), 2, ".5"),
+    *(
+        (f"{name.replace('_', ' ')}, {what} error{unit}", _parameter(name, what), 1, goal)
+        for name, what, unit, goal in (
+            ("dash_power", "mean", "", "3.5"),
+            ("dash_power", "median", "", ""),
+            ("dash_direction", "mean", ", deg", ""),
+            ("dash_direction", "median", ", deg", ""),
+            ("turn_moment", "mean", ", deg", "8"),
+            ("turn_moment", "median", ", deg", "0.2"),
+            ("kick_direction", "mean", ", deg", "35"),
+            ("kick_direction", "median", ", deg", "15"),
+            ("kick_power", "mean", "", "12"),
+            ("kick_power", "median", "", ""),
+            ("tackle_direction", "mean", ", deg", ""),
+            ("tackle_direction", "median", ", deg", ""),
+        )
+    ),
+)
+"""Rows of the table of goals: name, where the figure is, decimals, and the goal over the sets."""
+LOST_GOAL, MINUTES_GOAL = "under .01", "under 15"
+
+
+def write(
+    page: Path,
+    *,
+    results: Results,
+    left: Mapping[str, Any],
+    variants: Mapping[str, Mapping[str, Sequence[str]]],
+    cleaning: Mapping[str, Any] | None,
+    commands: Sequence[str],
+    situations: Sequence[str],
+    sure: float,
+) -> None:
+    """Write the page, and beside it the plot of the learning curve.
+
+    Args:
+        results: by name. left: of step g. variants: settings of steps d and e by name.
+        cleaning: the dataset's report; None where nothing was run. commands: that made store and dataset.
+    """
+    parts = [_head(results)]
+    if results and cleaning is not None:
+        parts += [_protocol(cleaning)]
+    parts += [_goals(results), _spread(results), _numbers(results), _likelihood(results)]
+    parts += [_variants("What each part gains", ABLATIONS_TEXT, results, variants.get("d", {}))]
+    parts += [_variants("Rare commands", REMEDIES_TEXT, results, variants.get("e", {}), rare=True)]
+    curve = left.get("curve")
+    if curve:
+        parts.append(_curve(curve, results, plot=f"{page.stem}.svg"))
+    if "agreement" in left:
+        parts.append(_left(left, results, situations=situations, sure=sure))
+    parts.append(_reproduce(results, commands))
+    page.parent.mkdir(parents=True, exist_ok=True)
+    if curve:
+        write_atomic(page.with_suffix(".svg"), plot(curve).encode())
+    write_atomic(page, ("\n\n".join(filled(part.strip()) for part in parts if part) + "\n").encode())
+
+
+def filled(text: str) -> str:
+    """Paragraphs wrapped to WIDTH; tables, headings, pictures and code stay."""
+    blocks = text.split("\n\n")
+    kept = ("|", "#", "!", "```")
+    return "\n\n".join(
+        block
+        if block.startswith(kept)
+        else textwrap.fill(" ".join(block.split()), WIDTH, break_long_words=False, break_on_hyphens=False)
+        for block in blocks
+    )
+
+
+def _sets(results: Results) -> list[str]:
+    return list(next(iter(results.values()))["sets"]) if results else []
+
+
+def seeds(results: Results) -> list[Mapping[str, Any]]:
+    return [result for name, result in results.items() if name.startswith("best-")]
+
+
+def value(figure: Any) -> float:
+    """The number of a figure with or without an interval; NaN where it is undefined."""
+    if isinstance(figure, Mapping):
+        figure = figure["value"]
+    return float("nan") if figure is None else float(figure)
+
+
+def mean(several: Sequence[Mapping[str, Any]], name: str, find: Callable[[Any], Any], who: str = "all") -> float:
+    """Of some results, the mean of a figure on a set."""
+    return float(np.mean([value(find(result["sets"][name][who])) for result in several]))
+
+
+def number(figure: float, digits: int) -> str:
+    return NOTHING if not np.isfinite(figure) else f"{figure:.{digits}f}"
+
+
+def signed(figure: float, digits: int) -> str:
+    return NOTHING if not np.isfinite(figure) else f"{figure:+.{digits}f}"
+
+
+def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [headers, ["---"] * len(headers), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _head(results: Results) -> str:
+    text = """# Fidelity
+
+How well clones of HELIOS_base know what the team will do, beside what we set out to reach, what each part of the
+preset `best` gains, and why it stops where it stops. `make fidelity MATCHES=folder` runs everything and writes this
+page; no figure of ours on it is typed by hand."""
+    if not results:
+        text += "\n\nNothing has been run yet: the page holds the goals only."
+    return text
+
+
+def _protocol(cleaning: Mapping[str, Any]) -> str:
+    by_split: dict[str, list[Mapping[str, Any]]] = {}
+    for match in cleaning["matches"]:
+        by_split.setdefault(match["split"], []).append(match)
+    rows = []
+    for split, matches in by_split.items():
+        for opponent in sorted({match["opponent"] for match in matches}):
+            those = [match for match in matches if match["opponent"] == opponent]
+            counts = [sum(match["rows"][kind] for match in those) for kind in KINDS]
+            rows.append([split, opponent, str(len(those)), *(f"{count:,}" for count in counts)])
+    order = ("train", "validation", "test", "unseen")
+    rows.sort(key=lambda row: (order.index(row[0]) if row[0] in order else len(order), row[1]))
+    return f"""## Protocol
+
+Whole matches are for training, validation or test, never for two of these. A row is a command that the server
+received of a field player in play_on; who keeps the goal is told by the log, not by his number. Validation chose the
+settings and the checkpoint (`best-loss`); the test matches and the unseen opponent were looked at only to write this
+page. Cells with slashes give the sets in one order: each test match, then all matches of the unseen opponent.
+
+{table(("split", "opponent", "matches", *KINDS), rows)}"""
+
+
+def _columns(results: Results) -> list[tuple[str, list[Mapping[str, Any]]]]:
+    """Who stands in the table of goals, with their results."""
+    columns = []
+    if seeds(results):
+        n = len(seeds(results))
+        columns.append((f"`best`, mean of {n} seeds" if n > 1 else "`best`", seeds(results)))
+    for name, title in (
+        ("paper", "`paper`"),
+        ("tree", "boosted trees"),
+        ("markov", "Markov table"),
+        ("persistence", "last command"),
+        ("majority", "most frequent command"),
+    ):
+        if name in results:
+            columns.append((title, [results[name]]))
+    return columns
+
+
+def _goals(results: Results) -> str:
+    names, columns = _sets(results), _columns(results)
+    rows = []
+    for title, find, digits, goal in FIGURES:
+        rows.append([title, goal])
+        for _, several in columns:
+            # Trees say the command alone.
+            silent = several[0]["name"] == "tree" and "error" in title and "ECE" not in title
+            cells = [NOTHING if silent else number(mean(several, name, find), digits) for name in names]
+            rows[-1].append(NOTHING if set(cells) == {NOTHING} else " / ".join(cells))
+    lost, minutes = ["accuracy lost on unseen opponents", LOST_GOAL], ["training time, minutes", MINUTES_GOAL]
+    for _, several in columns:
+        accuracies = [mean(several, name, FIGURES[0][1]) for name in names]
+        known = [figure for figure, name in zip(accuracies, names, strict=True) if name != "unseen"]
+        lost.append(signed(np.mean(known) - accuracies[-1], 3) if known and "unseen" in names else NOTHING)
+        times = [result["seconds"] / 60 for result in several if "seconds" in result]
+        minutes.append(number(float(np.mean(times)), 1) if times else NOTHING)
+    about = ""
+    if results:
+        tackles = [next(iter(results.values()))["sets"][name]["all"]["commands"]["tackle"]["support"] for name in names]
+        kicks = [next(iter(results.values()))["sets"][name]["all"]["commands"]["kick"]["support"] for name in names]
+        about = f"""
+Sets: {" / ".join(names)}. There are {" / ".join(f"{count:,}" for count in tackles)} tackles and
+{" / ".join(f"{count:,}" for count in kicks)} kicks in them, so a single tackle moves its recall by far. A dash
+stands where nothing is
+predicted or nothing occurs. Rules give a constant for each parameter, the median of training.
+"""
+    return f"""## Goals and figures
+
+Goals with slashes are for the test match against WEBase, the one against Cyrus2DBase, and the unseen opponent.
+{about}
+{table(("figure", "goal", *(title for title, _ in columns)), [*rows, lost, minutes])}"""
+
+
+def _spread(results: Results) -> str:
+    """Seeds apart, and intervals where a set has several matches."""
+    several = [result for result in (*seeds(results), results.get("paper")) if result is not None]
+    if not several:
+        return ""
+    rows = []
+    for result in several:
+        for name in _sets(results):
+            section = result["sets"][name]["all"]
+            cells = []
+            for figure, digits in (("accuracy", 4), ("cross_entropy", 4), ("ece", 4)):
+                item = section["model"][figure]
+                text = number(value(item), digits)
+                if item["low"] is not None:
+                    text += f" [{item['low']:.{digits}f}, {item['high']:.{digits}f}]"
+                cells.append(text)
+            rows.append([f"`{result['name']}`", name, f"{section['rows']:,}", str(section["matches"]), *cells])
+    headers = ("result", "set", "rows", "matches", "accuracy", "cross-entropy", "ECE")
+    return f"""## Seeds and intervals
+
+Brackets are 95 % intervals by bootstrap over whole matches. One match gives none, and from fewer than ten they are
+too narrow: take them as the spread seen so far.
+
+{table(headers, rows)}"""
+
+
+def _numbers(results: Results) -> str:
+    rows = []
+    for title, several in _columns(results):
+        cells = [
+            " / ".join(number(mean(several, name, find, who), 3) for name in _sets(results))
+            for find in (FIGURES[0][1], FIGURES[1][1])
+            for who in ("all", "2-11")
+        ]
+        rows.append([title, *cells])
+    if not rows:
+        return ""
+    headers = ("", "accuracy, field players", "players 2-11", "cross-entropy, field players", "players 2-11")
+    return f"""## Field players, and players 2 to 11
+
+A team may give its goalkeeper another number than 1. Then number 1 plays in the field, and who knows players by
+their number has never seen him there. The first column counts every field player; the second leaves number 1 out.
+
+{table(headers, rows)}"""
+
+
+def _likelihood(results: Results) -> str:
+    several = seeds(results)
+    if not several:
+        return ""
+    rows = []
+    for kind, even in zip(KINDS, EVEN_LOG_LOSS, strict=True):
+        losses = [mean(several, name, _command(kind, "parameter_log_loss")) for name in _sets(results)]
+        rows.append([kind, *(number(loss, 2) for loss in losses), number(float(even), 2)])
+    return f"""## Likelihood of parameters
+
+Mean -ln of the likelihood that `best` gave to the parameters of the command given, nats per unit of power and
+degree; lower is better.
+
+{table(("command", *_sets(results), "an even guess"), rows)}"""
+
+
+ABLATIONS_TEXT = """`without-X` leaves a block of inputs out, of the command's and of the kick's part; `with-X`
+adds one to the command's part; the others change what their settings say. Changes are to `short`, the preset `best`
+on the same shorter schedule: positive nats are worse, of the command's cross-entropy and of the log loss of
+parameters alike."""
+REMEDIES_TEXT = """What is said to help with rare commands, beside the preset `best` on the same shorter
+schedule. The class probabilities of balanced trainings are corrected for the balance unless `train.prior_correction`
+is off. `ensemble` trains three networks side by side."""
+
+
+def _variants(
+    heading: str, text: str, results: Results, variants: Mapping[str, Sequence[str]], *, rare: bool = False
+) -> str:
+    """Results of one step beside `short`."""
+    made = [name for name in variants if name in results]
+    if not made or "short" not in results:
+        return ""
+    names, base = _sets(results), results["short"]
+    accuracy, entropy = FIGURES[0][1], FIGURES[1][1]
+    rows = []
+    for name in ("short", *made):
+        several = [results[name]]
+
+        def change(find: Callable[[Any], Any], digits: int, factor: float = 1.0, *, of: Any = several) -> str:
+            return " / ".join(
+                signed(factor * (mean(of, item, find) - mean([base], item, find)), digits) for item in names
+            )
+
+        cells = [
+            " / ".join(number(mean(several, item, entropy), 3) for item in names),
+            NOTHING if name == "short" else change(entropy, 4),
+            " / ".join(number(mean(several, item, accuracy), 3) for item in names),
+            NOTHING if name == "short" else change(accuracy, 2, 100),
+        ]
+        if rare:
+            for kind in ("kick", "tackle"):
+                pairs = [
+                    [number(mean(several, item, _command(kind, what)), 2) for what in ("recall", "precision")]
+                    for item in names
+                ]
+                cells.append(" / ".join(", ".join(pair) for pair in pairs))
+            cells.append(" / ".join(number(mean(several, item, _model("ece")), 4) for item in names))
+        else:
+            for kind in ("dash", "turn", "kick"):
+                loss = _command(kind, "parameter_log_loss")
+                cells.append(NOTHING if name == "short" else change(loss, 3))
+        settings = "" if name == "short" else ", ".join(f"`{setting}`" for setting in variants[name])
+        rows.append([f"`{name}`", settings, *cells, number(results[name]["seconds"] / 60, 1)])
+    headers = ["variant", "settings", "cross-entropy", "change, nats", "accuracy", "change, points"]
+    if rare:
+        headers += ["kick: recall, precision", "tackle: recall, precision", "ECE"]
+    else:
+        headers += [f"parameters of {kind}, change, nats" for kind in ("dash", "turn", "kick")]
+    noise = ""
+    if len(seeds(results)) > 1:
+        spans = [np.ptp([value(entropy(result["sets"][item]["all"])) for result in seeds(results)]) for item in names]
+        noise = (
+            "\n\nOne seed each. The cross-entropies of the seeds of `best` lie "
+            f"{' / '.join(number(float(span), 4) for span in spans)} nats apart: smaller changes say nothing."
+        )
+    return f"## {heading}\n\n{text}{noise}\n\n{table([*headers, 'minutes'], rows)}"
+
+
+def _curve(curve: Mapping[str, Any], results: Results, *, plot: str) -> str:
+    names = list(curve)
+    counts = next(iter(curve.values()))["matches"]
+    points = {result["training_matches"]: result for name, result in results.items() if name.startswith("curve-")}
+    points[results["short"]["training_matches"]] = results["short"]
+    rows = []
+    for place, count in enumerate(counts):
+        entropies = " / ".join(number(curve[name]["cross_entropy"][place], 3) for name in names)
+        accuracies = " / ".join(number(mean([points[count]], name, FIGURES[0][1]), 3) for name in names)
+        rows.append([str(count), entropies, accuracies, number(points[count]["seconds"] / 60, 1)])
+    fits = [
+        [
+            name,
+            number(fit["floor"], 3),
+            f"{number(fit['floor_low'], 3)} to {number(fit['floor_high'], 3)}",
+            number(fit["exponent"], 2),
+            *(f"{number(entropy, 3)} ({count} matches)" for count, entropy in fit["leads_to"].items()),
+        ]
+        for name, fit in curve.items()
+    ]
+    headers = ("set", "floor, nats", "without any one point", "exponent", "twice the matches", "ten times")
+    return f"""## Learning curve
+
+The preset `best` on the shorter schedule; with fewer matches it takes more epochs, by the root of how many fewer
+there are. Every smaller set of matches is a part of the larger ones.
+
+![Cross-entropy by training matches]({plot})
+
+{table(("training matches", "cross-entropy", "accuracy", "minutes"), rows)}
+
+A power law that falls to a floor, `floor + scale * matches ^ -exponent`, fitted by least squares. The floor is what
+more matches alone would leave; from so few points it is a rough guess, as the fits without any one point show.
+
+{table(headers, fits)}"""
+
+
+def _left(left: Mapping[str, Any], results: Results, *, situations: Sequence[str], sure: float) -> str:
+    agreements = [
+        [
+            name,
+            f"{100 * row['error']:.1f} %",
+            *(f"{100 * row[key]:.0f} %" for key in ("systematic", "shared", "by_seed")),
+            *(number(row[key], 3) for key in ("entropy", "chance", "doubt")),
+        ]
+        for name, row in left["agreement"].items()
+    ]
+    where = [
+        [
+            name,
+            situation,
+            f"{row['rows']:,}",
+            f"{100 * row['share']:.1f} %",
+            f"{100 * row['error']:.1f} %",
+            number(row["cross_entropy"], 3),
+            f"{100 * row['share_of_errors']:.0f} %",
+            f"{100 * row['share_of_nats']:.0f} %",
+        ]
+        for name, found in left["situations"].items()
+        for situation in situations
+        if (row := found.get(situation)) is not None
+    ]
+    ensemble = []
+    for name, found in left["ensemble"].items():
+        section = found["all"]
+        single = [mean(seeds(results), name, find) for find in (FIGURES[0][1], FIGURES[1][1], FIGURES[2][1])]
+        cells = [value(find(section)) for find in (FIGURES[0][1], FIGURES[1][1], FIGURES[2][1])]
+        ensemble.append(
+            [name, *(f"{number(one, 4)} ({number(other, 4)})" for one, other in zip(cells, single, strict=True))]
+        )
+    return f"""## What is left
+
+Errors of {left["seeds"]} seeds of `best`. Systematic: all seeds make the error and are
+{100 * sure:.0f} % sure of it on average, so the inputs lack what decides, or the agent acted on something that is not
+in the log (its noisy sight, its memory). Shared, unsure: all make it and know that they may. By seed: only some make
+it, which more training data or an ensemble can mend. The entropy is what a calibrated model expects of its own
+cross-entropy; the part on which the seeds agree is chance as far as these inputs tell, the rest is doubt about the
+weights.
+
+{
+        table(
+            ("set", "errors", "systematic", "shared, unsure", "by seed", "entropy, nats", "chance", "doubt"),
+            agreements,
+        )
+    }
+
+The mean of the probabilities of all seeds; in brackets a single seed.
+
+{table(("set", "accuracy", "cross-entropy", "ECE"), ensemble)}
+
+Where the errors are. The ball is taken to roll on freely to tell who has it first.
+
+{table(("set", "situation", "rows", "share", "errors", "cross-entropy", "of all errors", "of all nats"), where)}"""
+
+
+def _reproduce(results: Results, commands: Sequence[str]) -> str:
+    text = "## Reproduce\n\n```sh\nmake fidelity MATCHES=folder\n```"
+    lines = [*commands, *(result["command"] for result in results.values() if "command" in result)]
+    if lines:
+        listing = "\n".join(lines)
+        text += f"\n\nwhich is, beside the measuring, with the logs in `MATCHES`:\n\n```\n{listing}\n```"
+    machines = {
+        f"{machine['processor']}, {machine['threads']} threads; teamclone {machine['teamclone']}, "
+        f"PyTorch {machine['torch']}, NumPy {machine['numpy']}, Python {machine['python']}"
+        for machine in (result["machine"] for result in results.values())
+    }
+    if machines:
+        text += "\n\nMachine and versions: " + "; and ".join(sorted(machines)) + "."
+    return text
+
+
+def plot(curve: Mapping[str, Any]) -> str:
+    """Cross-entropy by training matches with the fitted curves and their floors, as SVG for light and dark pages."""
+    style = {
+        "svg.hashsalt": "teamclone",
+        "font.size": 9.0,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "legend.frameon": False,
+    }
+    with mpl.rc_context(style):
+        figure = Figure(figsize=(7.4, 3.6), layout="constrained", facecolor="white")
+        axes = figure.subplots()
+        for colour, (name, fit) in zip(COLOURS, curve.items(), strict=False):
+            axes.plot(fit["matches"], fit["cross_entropy"], "o", color=colour, label=name, markersize=5)
+            along = np.geomspace(fit["matches"][0], 4 * fit["matches"][-1], 100)
+            axes.plot(along, fit["floor"] + fit["scale"] * along ** -fit["exponent"], color=colour, linewidth=1.2)
+            axes.axhline(fit["floor"], color=colour, linewidth=0.9, linestyle=(0, (3, 3)))
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(FixedLocator(next(iter(curve.values()))["matches"]))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(ScalarFormatter())
+        axes.set_xlabel("training matches, log scale")
+        axes.set_ylabel("cross-entropy, nats")
+        axes.set_title("dashed: the floor of each fit", fontsize=9, loc="right", color="#5d6872")
+        axes.legend()
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    text = stream.getvalue()
+    return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"

@@ -1,0 +1,69 @@
+"""Adapting a trained clone to another team: the network goes on from the weights of one that knows other teams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from teamclone.dataset.layout import Split
+from teamclone.dataset.reader import open_dataset
+from teamclone.errors import DatasetError, UsageError
+from teamclone.models.network import model_id
+from teamclone.training.config import Config, override
+from teamclone.training.run import Base, Run
+
+CHECKPOINT = "best-loss"
+"""Of the base, what is gone on from."""
+SETTINGS = (
+    "data.batch_size=1024",
+    "data.batches_per_epoch=300",
+    "train.epochs=8",
+    "train.learning_rate=5e-4",
+    "train.schedule=cosine",
+    "train.max_minutes=0",
+)
+"""What adapting does otherwise than its base: three matches make 120 batches of 1024 an epoch, enough steps for a rate
+that is low, so that the base is not forgotten before the new team is learned."""
+
+
+def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
+    """What `loop.train` needs to adapt a run: the settings and where to begin.
+
+    The network and its settings are those of the base, and so is the normalisation of its inputs, so that each input
+    means what it meant. The other settings are those of the base but for SETTINGS and what ``overrides`` say, each
+    ``section.key=value``.
+
+    Raises:
+        UsageError: a setting is unknown or wrong, or one of the network's.
+        RunError: the base has no CHECKPOINT, or it is damaged.
+    """
+    fixed = [text.partition("=")[0].strip() for text in overrides if text.strip().startswith("model.")]
+    if fixed:
+        raise UsageError(
+            f"--set: {', '.join(fixed)} cannot be changed, an adapted clone has the network of its base; "
+            "expected settings of data and train, or train a new clone with `teamclone train`"
+        )
+    config = override(base.config, [*SETTINGS, *overrides])
+    model = base.load_model(CHECKPOINT)
+    origin = {
+        "path": str(base.path),
+        "checkpoint": CHECKPOINT,
+        "model_id": model_id(model),
+        "team": base.environment["dataset"].get("team"),
+        "trained_on": _trained_on(base),
+    }
+    return config, Base(model=model, origin=origin)
+
+
+def _trained_on(run: Run) -> list[str] | None:
+    """The matches that the weights of a run have learned from, those of its own base among them; None if unknown."""
+    before: list[str] | None = run.environment["base"]["trained_on"] if "base" in run.environment else []
+    try:
+        dataset = open_dataset(run.dataset_path)
+    except DatasetError:
+        return None
+    if before is None or dataset.id != run.dataset_id:
+        return None
+    used = np.unique(dataset.match(dataset.split(Split.TRAIN)).numpy())
+    return sorted({*before, *(dataset.matches[index]["match_id"] for index in used)})

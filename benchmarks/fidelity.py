@@ -87,7 +87,7 @@ TINY = (
     "train.epochs=1",
 )
 """Settings of --quick, for the paper's network too."""
-TINY_RELATIVE = ("model.kick_hidden=[16]", "model.aim_hidden=[32]")
+TINY_RELATIVE = ("model.kick_hidden=[16]", "model.parameter_hidden=[16]", "model.aim_hidden=[32]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,9 +123,10 @@ def ablations() -> dict[str, tuple[str, ...]]:
     for block in ("view", "past"):
         if block not in model.blocks:
             found[f"with-{block}"] = (f"model.blocks={','.join((*model.blocks, block))}",)
-    found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]")
+    found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0.0")
     found["point-head"] = (
-        *("model.head=point", "model.kick_blocks=[]", "model.kick_hidden=[]"),
+        *("model.head=point", "model.parameter_hidden=[]", "train.aim_weight=0.0"),
+        *("model.kick_blocks=[]", "model.kick_hidden=[]", "model.kick_dropout=0.0"),
         *("train.parameter_loss=masked", "train.parameter_weight=1.0"),
     )
     found["gelu" if model.activation != "gelu" else "relu"] = (
@@ -196,7 +197,7 @@ class Work:
         ingest = self.teamclone("ingest", options.matches, "--store", store)
         build = self.teamclone(
             *("dataset", "--store", store, "--team", options.team, *unseen),
-            *("--commands", "received", *split, "--out", folder),
+            *("--commands", "received", "--train-goalkeepers", *split, "--out", folder),
         )
         self.commands += [ingest, build]
         if not folder.is_dir():

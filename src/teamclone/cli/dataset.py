@@ -22,6 +22,9 @@ def dataset(
         "executed"
     ),
     turn_zero: Annotated[str, typer.Option(help="keep or drop (turn 0), which means doing nothing.")] = "keep",
+    train_goalkeepers: Annotated[
+        bool, typer.Option("--train-goalkeepers", help="Train on goalkeepers' commands, too; never test on them.")
+    ] = False,
     test: Annotated[float, typer.Option(help="Share of the matches for the test.", min=0, max=0.9)] = 0.15,
     validation: Annotated[float, typer.Option(help="Share of the matches for validation.", min=0, max=0.9)] = 0.15,
     test_match: Annotated[
@@ -48,6 +51,7 @@ def dataset(
         split=choice(SplitBy, split, option="--split"),
         commands=choice(Commands, commands, option="--commands"),
         turn_zero=choice(TurnZero, turn_zero, option="--turn-zero"),
+        train_goalkeepers=train_goalkeepers,
         test_matches=tuple(test_match or ()),
         validation_matches=tuple(validation_match or ()),
         test=test,

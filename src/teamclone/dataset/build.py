@@ -45,6 +45,9 @@ class DatasetConfig:
         unseen: opponents kept out of training, validation and test.
         split: see SplitBy.
         commands, turn_zero: see `clean`.
+        train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. Teams now and
+            then give the goalkeeper another number: who then plays in the field with his number may well play as he
+            does, and a network that knows players by their numbers has otherwise never seen him.
         test_matches, validation_matches: match ids or parts of log names that must fall there; the other split
             shares are then drawn from the rest.
         test, validation: share of the matches.
@@ -56,6 +59,7 @@ class DatasetConfig:
     split: SplitBy = SplitBy.MATCH
     commands: Commands = Commands.EXECUTED
     turn_zero: TurnZero = TurnZero.KEEP
+    train_goalkeepers: bool = False
     test_matches: tuple[str, ...] = ()
     validation_matches: tuple[str, ...] = ()
     test: float = 0.15
@@ -83,6 +87,7 @@ class _Task:
     entry: _Entry
     commands: Commands
     turn_zero: TurnZero
+    goalkeepers: bool
 
 
 def build_dataset(
@@ -109,11 +114,14 @@ def build_dataset(
         and rows), ``rows`` by split and kind, ``player_cycles``, ``idle`` and ``frozen``.
 
     Raises:
-        UsageError: a team or an unseen opponent does not occur in the store, or a team is named twice.
+        UsageError: a team or an unseen opponent does not occur in the store, a team is named twice, or options exclude
+            each other.
         StoreError: a match cannot be read, or a worker does not see the store.
         DatasetError: no row is left, or ``out`` cannot be written.
         ClusterError: the connection to the executor's workers was lost.
     """
+    if config.train_goalkeepers and config.split is SplitBy.ROWS:
+        raise UsageError("--train-goalkeepers keeps goalkeepers out of whole test matches; it needs --split match")
     entries, without_team = _entries(store, config)
     splits = split_matches(
         [MatchKey(match_id=entry.match_id, team=entry.team, opponent=entry.opponent) for entry in entries],
@@ -125,7 +133,14 @@ def build_dataset(
     )
     shared = SharedStore.of(store)
     tasks = [
-        _Task(store=shared, entry=entry, commands=config.commands, turn_zero=config.turn_zero) for entry in entries
+        _Task(
+            store=shared,
+            entry=entry,
+            commands=config.commands,
+            turn_zero=config.turn_zero,
+            goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
+        )
+        for entry in entries
     ]
     matches: list[dict[str, Any]] = []
     types: list[NDArray[np.float32]] = []
@@ -182,6 +197,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:
         side=task.entry.side,
         keep=task.commands,
         turn_zero=task.turn_zero,
+        goalkeepers=task.goalkeepers,
     )
     types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
     return samples, np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32)

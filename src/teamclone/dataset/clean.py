@@ -105,6 +105,7 @@ def clean_match(
     side: int,
     keep: Commands = Commands.EXECUTED,
     turn_zero: TurnZero = TurnZero.KEEP,
+    goalkeepers: bool = False,
 ) -> MatchSamples:
     """Cleans and binds the commands of one team in one match.
 
@@ -113,6 +114,7 @@ def clean_match(
             (n_commands,) in log order.
         server_params: ranges of the arguments; the server's defaults where one is missing.
         side: the modelled team's, 1 left or -1 right.
+        goalkeepers: keep the goalkeeper's commands, too.
     """
     rules: list[Rule] = []
 
@@ -132,7 +134,8 @@ def clean_match(
     rows = narrow(rows, play_on[commands["frame"][rows]], "in play_on")
     slots = slot_of(commands["side"], commands["unum"])
     goalie = (players["state"] & state_bits.GOALIE) != 0
-    rows = narrow(rows, ~goalie[commands["frame"][rows], slots[rows]], "of field players")
+    of_field = ~goalie[commands["frame"][rows], slots[rows]]
+    rows = narrow(rows, of_field | goalkeepers, "of field players")
     first = first_body_commands(commands, frames["playmode"], play_on=PlayMode.PLAY_ON)
     rows = narrow(rows, np.isin(rows, first), "first of the cycle")
     has_command = np.zeros_like(goalie)

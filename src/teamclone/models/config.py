@@ -26,7 +26,9 @@ class ModelConfig:
         kick_blocks: blocks that decide where a kick goes.
         aims: places on the pitch that the network supposes a player to make for; see `aims.Aims`.
         aim_hidden: widths of the layers that find them.
+        parameter_hidden: widths of the layers that find power and direction of dashes and turns.
         kick_hidden: widths of the layers that decide where a kick goes.
+        kick_dropout: `dropout` of these, of which there are few examples.
         hidden: widths of the hidden layers.
         activation: see `ACTIVATIONS`.
         dropout: share of the hidden units left out at random in training.
@@ -41,7 +43,9 @@ class ModelConfig:
     kick_blocks: tuple[str, ...] = ()
     aims: int = 0
     aim_hidden: tuple[int, ...] = ()
+    parameter_hidden: tuple[int, ...] = ()
     kick_hidden: tuple[int, ...] = ()
+    kick_dropout: float = 0.0
     hidden: tuple[int, ...] = (512, 256, 128)
     activation: str = "relu"
     dropout: float = 0.0

@@ -11,12 +11,11 @@ from torch import Tensor, nn
 
 from teamclone.models import mixture
 from teamclone.models.aims import geometry_of
+from teamclone.models.kicks import Kicks
 from teamclone.models.loss import LIMITS, Balance, Loss, ParameterLoss, mixture_loss, point_loss
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
-from teamclone.models.relative import GEOMETRY, MATES
 from teamclone.models.state import Target
-from teamclone.rcss import pitch
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 
 INCOMES = 6
 """Components of dash power that are a learned multiple of what the player recovers in a cycle."""
@@ -26,10 +25,8 @@ DASH_DIRECTIONS = 24
 """Classes of dash direction, 15 degrees apart."""
 TACKLE_DIRECTIONS = 40
 """Classes of tackle direction, 9 degrees apart."""
-KICK_PLACES = 8
-"""Places beside the team mates that the ball is kicked towards."""
-LEAD_M = 12.0
-"""How far from a team mate a pass may go."""
+AIM_SCALE_DEG = 4.0
+"""How near an aim has to be to the direction of a turn to be taught by it."""
 
 
 class Prediction(NamedTuple):
@@ -45,13 +42,19 @@ class Situation(NamedTuple):
 
     Attributes:
         hidden: (batch, width) what the command is decided on.
-        kick: (batch, kick width) what a kick is decided on.
+        parameters: (batch, parameter width) what dashes and turns are.
+        kick, kick_geometry: (2 * kicks, kick width) and (2 * kicks, len(GEOMETRY)) what kicks and tackles are, first
+            of the situations as they are, then of the same mirrored.
+        kicks: (kicks,) which situations these are; None for all.
         geometry: (batch, len(GEOMETRY)).
         bearing, power: (batch, aims) as of `aims.Aims`.
     """
 
     hidden: Tensor
+    parameters: Tensor
     kick: Tensor
+    kick_geometry: Tensor
+    kicks: Tensor | None
     geometry: Tensor
     bearing: Tensor
     power: Tensor
@@ -106,13 +109,23 @@ class PointHead(nn.Module):
         *,
         parameter_loss: ParameterLoss = "paper",
         weight: float = 1.0,
+        aim_weight: float = 0.0,
         balance: Balance | None = None,
         whole: Tensor | None = None,
     ) -> Loss:
+        """The paper's; ``aim_weight`` does not apply."""
         logits, projected = output
         return point_loss(
             logits, projected, target, parameter_loss=parameter_loss, weight=weight, balance=balance, whole=whole
         )
+
+
+class Kick(NamedTuple):
+    """One answer on what a kick or tackle would be: power, radians, (kicks, TACKLE_DIRECTIONS) logits."""
+
+    power: Mixture
+    direction: Mixture
+    tackle: Tensor
 
 
 class Distribution(NamedTuple):
@@ -122,8 +135,9 @@ class Distribution(NamedTuple):
         logits: (batch, 4) over CLONED_KINDS.
         dash_power: power. dash_direction: (batch, DASH_DIRECTIONS) logits. turn: radians before the loss by motion.
         turn_factor: (batch,) turn moment for one degree.
-        kick_power, kick_direction: power and radians; both have the shares of the same components.
-        tackle_direction: (batch, TACKLE_DIRECTIONS) logits.
+        aim: the turn again, by the aims alone: only they are to learn from it.
+        kick: several answers of which the mean counts.
+        kicks: (kicks,) of which situations they are; None for all.
     """
 
     logits: Tensor
@@ -131,113 +145,110 @@ class Distribution(NamedTuple):
     dash_direction: Tensor
     turn: Mixture
     turn_factor: Tensor
-    kick_power: Mixture
-    kick_direction: Mixture
-    tackle_direction: Tensor
+    aim: Mixture
+    kick: tuple[Kick, ...]
+    kicks: Tensor | None
 
 
 class MixtureHead(nn.Module):
     """Command probabilities, and for each command a distribution of its parameters.
 
     Components hang on what a player may want: to face the ball, where he meets it or where he makes for; to come to
-    rest there; to spend a multiple of what he recovers; to kick the ball towards a team mate or a place. The network
-    gives their shares, small corrections and scales.
+    rest there; to spend a multiple of what he recovers; to kick as `kicks.Kicks` says. The network gives their shares,
+    small corrections and scales.
+
+    A parameter known to a hundredth of a degree pulls a thousand times harder than a command; so the layers that they
+    share learn from the commands, and the aims from turns by a bell of their own.
 
     Args:
-        width: of what the command is decided on. kick_width: of what a kick is. aims: places of `aims.Aims`.
+        width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
+            kicks are. aims: places of `aims.Aims`.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.
     """
 
-    goal: Tensor
     temperature: Tensor
 
-    def __init__(self, width: int, kick_width: int, aims: int) -> None:
+    def __init__(self, width: int, parameter_width: int, kick_width: int, aims: int) -> None:
         super().__init__()
-        self.n_dash, self.n_turn, self.n_kick = aims + INCOMES + FREE, aims + 2 + FREE, MATES + KICK_PLACES
+        self.n_dash, self.n_turn = aims + INCOMES + FREE, aims + 2 + FREE
         self.command = nn.Linear(width, len(CLONED_KINDS))
-        self.dash = nn.Linear(width, 3 * self.n_dash + DASH_DIRECTIONS)
-        self.turn = nn.Linear(width, 3 * self.n_turn)
-        self.kick = nn.Linear(kick_width, 6 * self.n_kick)
+        self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
+        self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
+        self.kick = Kicks(kick_width)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))
-        self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("temperature", torch.ones(()))
 
     def forward(self, situation: Situation) -> Distribution:
-        hidden, kick = situation.hidden, situation.kick
-        command, dash, turn = (layer(hidden).float() for layer in (self.command, self.dash, self.turn))
-        kick_raw, tackle = self.kick(kick).float(), self.tackle(kick).float()
-        with torch.autocast(hidden.device.type, enabled=False):
-            kick_power, kick_direction = self._kick(kick_raw, situation.geometry)
-            factor = geometry_of(situation.geometry, "turn_factor")[0][:, 0]
+        command = self.command(situation.hidden).float()
+        dash, turn = (layer(situation.parameters).float() for layer in (self.dash, self.turn))
+        kick = self._kick(situation)
+        with torch.autocast(command.device.type, enabled=False):
+            turned, aim = self._turn(turn, situation)
             return Distribution(
                 logits=command,
                 dash_power=self._dash(dash[:, : 3 * self.n_dash], situation),
                 dash_direction=dash[:, 3 * self.n_dash :],
-                turn=self._turn(turn, situation),
-                turn_factor=factor,
-                kick_power=kick_power,
-                kick_direction=kick_direction,
-                tackle_direction=tackle,
+                turn=turned,
+                turn_factor=geometry_of(situation.geometry, "turn_factor")[0][:, 0],
+                aim=aim,
+                kick=kick,
+                kicks=situation.kicks,
             )
 
     def _dash(self, raw: Tensor, situation: Situation) -> Mixture:
         logits, shift, scale = raw.chunk(3, 1)
         income = geometry_of(situation.geometry, "income")[0]
-        wanted = [situation.power.clamp(-20, 120), income * self.incomes, self.powers.expand(len(raw), -1)]
+        free = self.powers.expand(raw.shape[0], -1)
+        wanted = [situation.power.detach().clamp(-20, 120), income * self.incomes, free]
         return Mixture(
             logits, torch.cat(wanted, 1) + 5 * shift, mixture.scale_of(scale, least=LEAST_POWER, typical=3.0)
         )
 
-    def _turn(self, raw: Tensor, situation: Situation) -> Mixture:
+    def _turn(self, raw: Tensor, situation: Situation) -> tuple[Mixture, Mixture]:
+        """The turn, and by the aims alone."""
         logits, shift, scale = raw.chunk(3, 1)
         to_ball, to_meet = geometry_of(situation.geometry, "turn_to_ball", "turn_to_meet")
-        free = torch.linspace(-0.75, 0.75, FREE, device=raw.device).expand(len(raw), -1) * torch.pi
+        free = torch.linspace(-0.75, 0.75, FREE, device=raw.device).expand(raw.shape[0], -1) * torch.pi
         centre = torch.cat([to_ball, to_meet, situation.bearing, free], 1)
         # Only the free ones go far from where they begin.
         reach = torch.cat([torch.full_like(centre[:, :-FREE], 0.05), torch.ones_like(free)], 1)
-        return Mixture(
-            logits, wrap(centre + reach * shift), mixture.scale_of(scale, least=LEAST_ANGLE, typical=2 * DEGREE)
+        turn = Mixture(
+            logits,
+            wrap(centre.detach() + reach * shift),
+            mixture.scale_of(scale, least=LEAST_ANGLE, typical=2 * DEGREE),
         )
+        width = torch.full_like(centre, AIM_SCALE_DEG * DEGREE)
+        return turn, Mixture(logits.detach(), wrap(centre), width)
 
-    def _kick(self, raw: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
-        """Components are velocities that the ball is to have, towards a place; then the kick that adds what lacks."""
-        logits, ahead, aside, speed, power_scale, angle_scale = raw.view(len(raw), 6, self.n_kick).unbind(1)
-        mates = geometry[:, len(GEOMETRY) - 2 * MATES :].view(-1, MATES, 2)
-        x, y, cos, sin, rate = geometry_of(geometry, "ball_x", "ball_y", "cos", "sin", "kick_gain")
-        offset = LEAD_M * torch.stack([ahead, aside], -1)
-        ball = torch.cat([x, y], 1)[:, None]
-        base = torch.cat([mates, self.goal.expand(len(raw), 1, 2), ball.expand(-1, KICK_PLACES - 1, 2)], 1)
-        way = base + offset - ball
-        direction = way / torch.sqrt(way.square().sum(-1, keepdim=True) + 1e-6)
-        wanted = direction * (3.0 * torch.sigmoid(speed))[..., None]
-        gain_x, gain_y = (
-            wanted[..., 0] - geometry_of(geometry, "ball_vx")[0],
-            wanted[..., 1] - geometry_of(geometry, "ball_vy")[0],
-        )
-        power = torch.sqrt(gain_x.square() + gain_y.square() + 1e-6) / rate.clamp(min=5e-3)
-        angle = torch.atan2(gain_y * cos - gain_x * sin, gain_x * cos + gain_y * sin)
+    def _kick(self, situation: Situation) -> tuple[Kick, Kick]:
+        """As the situation is and from its mirror: what is right on the left is right on the right."""
+        both = self.kick(situation.kick, situation.kick_geometry)
+        tackle = self.tackle(situation.kick).float()
+        (power, power_mirrored), (direction, direction_mirrored) = (mixture.halves(part) for part in both)
+        plain, tackle_mirrored = tackle.chunk(2)
+        # Class k lies at k steps, its mirror at -k.
+        opposite = torch.remainder(-torch.arange(TACKLE_DIRECTIONS, device=tackle.device), TACKLE_DIRECTIONS)
         return (
-            Mixture(logits, power.clamp(max=150.0), mixture.scale_of(power_scale, least=LEAST_POWER, typical=5.0)),
-            Mixture(logits, angle, mixture.scale_of(angle_scale, least=LEAST_ANGLE, typical=6 * DEGREE)),
+            Kick(power, direction, plain),
+            Kick(power_mirrored, mixture.mirrored(direction_mirrored), tackle_mirrored[:, opposite]),
         )
 
     @staticmethod
     def merged(outputs: Sequence[Distribution]) -> Distribution:
         """The answers of several heads as one: mean probabilities, and mixtures of all their components."""
-        first = outputs[0]
         return Distribution(
             logits=mean_logits([output.logits for output in outputs]),
             dash_power=mixture.merged([output.dash_power for output in outputs]),
             dash_direction=mean_logits([output.dash_direction for output in outputs]),
             turn=mixture.merged([output.turn for output in outputs]),
-            turn_factor=first.turn_factor,
-            kick_power=mixture.merged([output.kick_power for output in outputs]),
-            kick_direction=mixture.merged([output.kick_direction for output in outputs]),
-            tackle_direction=mean_logits([output.tackle_direction for output in outputs]),
+            turn_factor=outputs[0].turn_factor,
+            aim=mixture.merged([output.aim for output in outputs]),
+            kick=tuple(kick for output in outputs for kick in output.kick),
+            kicks=outputs[0].kicks,
         )
 
     @staticmethod
@@ -246,15 +257,25 @@ class MixtureHead(nn.Module):
         return output.logits
 
     def point(self, output: Distribution) -> Prediction:
-        """The single best answer, in power and degrees: of each mixture the component nearest to its median."""
+        """The single best answer, in power and degrees: of each mixture the component nearest to its median.
+
+        Where the kick was not asked for, its parameters are 0.
+        """
         turn = mixture.middle(output.turn.logits, output.turn.centre, angle=True) / DEGREE * output.turn_factor
+        kick = _mean_kick(output.kick)
+        with_ball = [
+            mixture.middle(kick.power.logits, kick.power.centre.clamp(0, 100), angle=False),
+            mixture.middle(kick.direction.logits, kick.direction.centre, angle=True) / DEGREE,
+            direction_of(kick.tackle),
+        ]
+        kick_power, kick_direction, tackle = (_spread(values, output) for values in with_ball)
         parameters = [
             mixture.middle(output.dash_power.logits, output.dash_power.centre.clamp(0, 100), angle=False),
             direction_of(output.dash_direction),
             turn.clamp(-180.0, 180.0),
-            mixture.middle(output.kick_power.logits, output.kick_power.centre.clamp(0, 100), angle=False),
-            mixture.middle(output.kick_direction.logits, output.kick_direction.centre, angle=True) / DEGREE,
-            direction_of(output.tackle_direction),
+            kick_power,
+            kick_direction,
+            tackle,
         ]
         return Prediction(output.logits / self.temperature, torch.stack(parameters, 1))
 
@@ -265,15 +286,26 @@ class MixtureHead(nn.Module):
         *,
         parameter_loss: ParameterLoss = "paper",
         weight: float = 1.0,
+        aim_weight: float = 0.0,
         balance: Balance | None = None,
         whole: Tensor | None = None,
     ) -> Loss:
-        """Negative log-likelihood of command and parameters together; ``parameter_loss`` does not apply."""
+        """Negative log-likelihood of command and parameters together; ``parameter_loss`` does not apply.
+
+        Each answer on a kick counts by itself, so that it learns as if alone.
+        """
+        kicks = [_kick_likelihood(kick, output, target) for kick in output.kick]
+        aims = mixture.log_likelihood(
+            output.aim.logits,
+            mixture.angle_terms(output.aim, target.parameters[:, 0], factor=output.turn_factor),
+        )
         return mixture_loss(
             output.logits,
-            self.log_likelihood(output, target),
+            _chosen(output, target, torch.stack(kicks).mean(0)),
             target,
+            aims=torch.where(target.kind == CLONED_KINDS.index(CommandKind.TURN), aims, 0.0),
             weight=weight,
+            aim_weight=aim_weight,
             balance=balance,
             whole=whole,
         )
@@ -281,18 +313,42 @@ class MixtureHead(nn.Module):
     @staticmethod
     def log_likelihood(output: Distribution, target: Target) -> Tensor:
         """(batch,) log-likelihood of the parameters of the command given, per unit of power and degree."""
-        first, second = target.parameters[:, 0], target.parameters[:, 1]
-        kick = mixture.power_terms(output.kick_power, first) + mixture.angle_terms(output.kick_direction, second)
-        by_kind = [
-            mixture.log_likelihood(output.dash_power.logits, mixture.power_terms(output.dash_power, first))
-            + log_class(output.dash_direction, second),
-            mixture.log_likelihood(
-                output.turn.logits, mixture.angle_terms(output.turn, first, factor=output.turn_factor)
-            ),
-            mixture.log_likelihood(output.kick_power.logits, kick),
-            log_class(output.tackle_direction, first),
-        ]
-        return torch.stack(by_kind, 1).gather(1, target.kind[:, None]).squeeze(1)
+        return _chosen(output, target, _kick_likelihood(_mean_kick(output.kick), output, target))
+
+
+def _mean_kick(kicks: Sequence[Kick]) -> Kick:
+    return Kick(
+        power=mixture.merged([kick.power for kick in kicks]),
+        direction=mixture.merged([kick.direction for kick in kicks]),
+        tackle=mean_logits([kick.tackle for kick in kicks]),
+    )
+
+
+def _spread(values: Tensor, output: Distribution) -> Tensor:
+    """(batch, ...) values of the situations whose kick was asked for, 0 for the others."""
+    if output.kicks is None:
+        return values
+    return values.new_zeros(output.logits.shape[0], *values.shape[1:]).index_copy(0, output.kicks, values)
+
+
+def _kick_likelihood(kick: Kick, output: Distribution, target: Target) -> Tensor:
+    """(batch, 2) log-likelihood of the parameters as those of a kick and of a tackle."""
+    parameters = target.parameters if output.kicks is None else target.parameters[output.kicks]
+    first, second = parameters[:, 0], parameters[:, 1]
+    terms = mixture.power_terms(kick.power, first) + mixture.angle_terms(kick.direction, second)
+    both = [mixture.log_likelihood(kick.power.logits, terms), log_class(kick.tackle, first)]
+    return _spread(torch.stack(both, 1), output)
+
+
+def _chosen(output: Distribution, target: Target, kick: Tensor) -> Tensor:
+    """(batch,) log-likelihood of the parameters of the command given; ``kick`` as of `_kick_likelihood`."""
+    first, second = target.parameters[:, 0], target.parameters[:, 1]
+    dash = mixture.log_likelihood(output.dash_power.logits, mixture.power_terms(output.dash_power, first))
+    turn = mixture.log_likelihood(
+        output.turn.logits, mixture.angle_terms(output.turn, first, factor=output.turn_factor)
+    )
+    by_kind = torch.stack([dash + log_class(output.dash_direction, second), turn, kick[:, 0], kick[:, 1]], 1)
+    return by_kind.gather(1, target.kind[:, None]).squeeze(1)
 
 
 class EnsembleHead(nn.Module):

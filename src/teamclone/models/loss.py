@@ -35,7 +35,8 @@ class Balance(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """The training error and its two parts, scalars: ``total = cross_entropy + weight * parameters``."""
+    """The training error and two parts of it, scalars: ``total = cross_entropy + weight * parameters`` and, of a
+    `MixtureHead`, what teaches the aims."""
 
     total: Tensor
     cross_entropy: Tensor
@@ -105,17 +106,24 @@ def mixture_loss(
     log_likelihood: Tensor,
     target: Target,
     *,
+    aims: Tensor | None = None,
     weight: float = 1.0,
+    aim_weight: float = 0.0,
     balance: Balance | None = None,
     whole: Tensor | None = None,
 ) -> Loss:
     """Mean negative log-likelihood of the command and, given the command, of its parameters.
 
     Args:
-        logits: (batch, 4). log_likelihood: (batch,) of the parameters. target, weight, balance, whole: as of
-            `point_loss`.
+        logits: (batch, 4). log_likelihood: (batch,) of the parameters.
+        aims: (batch,) log-likelihood of the turns as the aims alone see them, 0 of other commands; None without aims.
+        aim_weight: of its mean.
+        target, weight, balance, whole: as of `point_loss`.
     """
     n = len(target.kind if whole is None else whole)
     cross_entropy = command_loss(logits, target.kind, balance=balance, of=n)
     parameters = -log_likelihood.sum() / n
-    return Loss(cross_entropy + weight * parameters, cross_entropy, parameters)
+    total = cross_entropy + weight * parameters
+    if aims is not None:
+        total = total - aim_weight * aims.sum() / n
+    return Loss(total, cross_entropy, parameters)

@@ -32,8 +32,9 @@ class Mixture(NamedTuple):
 
 
 def scale_of(raw: Tensor, *, least: float, typical: float) -> Tensor:
-    """A scale from an unbounded output; ``typical`` for 0."""
-    return least + typical * torch.exp(raw.clamp(-8.0, 3.0))
+    """A scale from an unbounded output: about ``typical`` for 0, at most some twenty times as much."""
+    # Bent, not cut off: what is cut off has no gradient to come back by.
+    return least + typical * torch.exp(3.0 - functional.softplus(3.0 - raw))
 
 
 def wrap(angle: Tensor) -> Tensor:
@@ -96,6 +97,17 @@ def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None
 def log_likelihood(logits: Tensor, terms: Tensor) -> Tensor:
     """(batch,) of the mixture, from what each component gives."""
     return torch.logsumexp(torch.log_softmax(logits, 1) + terms, 1)
+
+
+def halves(parts: Mixture) -> tuple[Mixture, Mixture]:
+    """Those of the first and of the second half of the batch."""
+    (first, second), (centre, other_centre), (scale, other_scale) = (part.chunk(2) for part in parts)
+    return Mixture(first, centre, scale), Mixture(second, other_centre, other_scale)
+
+
+def mirrored(angles: Mixture) -> Mixture:
+    """The same with left and right exchanged."""
+    return angles._replace(centre=-angles.centre)
 
 
 def merged(parts: Sequence[Mixture]) -> Mixture:

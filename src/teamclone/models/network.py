@@ -20,11 +20,15 @@ _ACTIVATIONS: dict[str, type[nn.Module]] = {"relu": nn.ReLU, "gelu": nn.GELU, "s
 
 
 class AimedTrunk(nn.Module):
-    """Hidden layers over relative inputs: where the player makes for, then what he does, and apart from it a kick."""
+    """Hidden layers over relative inputs: where the player makes for, then what he does, how, and apart from it a kick.
+
+    The layers of dashes and turns see what the command was decided on, but do not teach it, see `MixtureHead`.
+    """
 
     command_columns: Tensor
     kick_columns: Tensor
     aim_columns: Tensor
+    signs: Tensor
 
     def __init__(self, config: ModelConfig, features: RelativeFeatures) -> None:
         super().__init__()
@@ -36,16 +40,30 @@ class AimedTrunk(nn.Module):
             ("aim_columns", ("role",) if "role" in config.blocks else ()),
         ):
             self.register_buffer(name, torch.tensor(features.columns(blocks)), persistent=False)
+        self.register_buffer("signs", features.signs, persistent=False)
         self.aims = Aims(len(self.aim_columns), config.aims, config.aim_hidden, activation)
-        seen = COLUMNS * config.aims
-        self.command = layers((len(self.command_columns) + seen, *config.hidden), activation, config.dropout)
-        self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.dropout)
+        seen = len(self.command_columns) + COLUMNS * config.aims
+        self.command = layers((seen, *config.hidden), activation, config.dropout)
+        self.answers = config.head == "mixture"
+        if self.answers:
+            self.parameters_of = layers(
+                (seen + config.hidden[-1], *config.parameter_hidden), activation, config.dropout
+            )
+            self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.kick_dropout)
 
-    def forward(self, inputs: Tensor) -> Situation:
+    def forward(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Situation:
+        """``kicks``: which of the situations need the layers of a kick, (n,) places; None for all."""
         columns, geometry = inputs[:, : self.n_inputs], inputs[:, self.n_inputs :]
-        seen, bearing, power = self.aims(columns.index_select(1, self.aim_columns), geometry)
-        hidden = self.command(torch.cat([columns.index_select(1, self.command_columns), seen], 1))
-        return Situation(hidden, self.kick(columns.index_select(1, self.kick_columns)), geometry, bearing, power)
+        aims, bearing, power = self.aims(columns.index_select(1, self.aim_columns), geometry)
+        seen = torch.cat([columns.index_select(1, self.command_columns), aims], 1)
+        hidden = self.command(seen)
+        parameters = kick = both = hidden[:0]
+        if self.answers:
+            parameters = self.parameters_of(torch.cat([seen, hidden], 1).detach())
+            chosen = inputs if kicks is None else inputs.index_select(0, kicks)
+            both = torch.cat([chosen, chosen * self.signs])
+            kick = self.kick(both.index_select(1, self.kick_columns))
+        return Situation(hidden, parameters, kick, both[:, self.n_inputs :], kicks, geometry, bearing, power)
 
 
 class Trunks(nn.Module):
@@ -55,8 +73,8 @@ class Trunks(nn.Module):
         super().__init__()
         self.members = nn.ModuleList(members)
 
-    def forward(self, inputs: Tensor) -> list[Any]:
-        return [member(inputs) for member in self.members]
+    def forward(self, inputs: Tensor, **options: Any) -> list[Any]:
+        return [member(inputs, **options) for member in self.members]
 
 
 class Clone(nn.Module):
@@ -91,9 +109,16 @@ class Clone(nn.Module):
         """What the head answers, for ``head.loss`` and ``head.point``."""
         return self.answer(self.features(state))
 
-    def answer(self, inputs: Tensor) -> Any:
-        """The same from what the features make of a state, (batch, columns)."""
-        return self.head(self.trunk(inputs))
+    def answer(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Any:
+        """The same from what the features make of a state, (batch, columns).
+
+        Args:
+            kicks: (n,) places of the situations of which to answer on kicks and tackles, too; None for all. Training,
+                which knows where one was given, saves half its time by it. The paper's network answers all at once.
+        """
+        if kicks is None or self.config.head == "point":
+            return self.head(self.trunk(inputs))
+        return self.head(self.trunk(inputs, kicks=kicks))
 
     def forward(self, state: State) -> Prediction:
         return self.head.point(self.output(state))
@@ -113,7 +138,7 @@ def _trunk(config: ModelConfig, features: PaperFeatures | RelativeFeatures) -> n
 
 def _head(config: ModelConfig) -> PointHead | MixtureHead:
     if config.head == "mixture":
-        return MixtureHead(config.hidden[-1], config.kick_hidden[-1], config.aims)
+        return MixtureHead(config.hidden[-1], config.parameter_hidden[-1], config.kick_hidden[-1], config.aims)
     return PointHead(config.hidden[-1])
 
 

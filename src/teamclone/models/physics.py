@@ -117,13 +117,9 @@ def reach_ball(ball: Tensor, players: Tensor, types: Tensor, *, held: Tensor, ac
     power = 100.0 * types[..., TYPE_FIELD["dash_power_rate"], None]
     full = power * types[..., TYPE_FIELD["effort_max"], None]
 
-    def covered(cycles: Tensor, acceleration: Tensor) -> Tensor:
-        """Metres from rest in so many dashes."""
-        return acceleration / (1.0 - decay) * (cycles - decay * (1.0 - decay**cycles) / (1.0 - decay))
-
-    can = (distance <= area) | (covered((count - turns).clamp(min=0.0), full) >= distance - area)
+    can = (distance <= area) | (covered((count - turns).clamp(min=0.0), full, decay) >= distance - area)
     steps = torch.where(can.any(-1), can.to(ball.dtype).argmax(-1).to(ball.dtype), STEPS)
-    rest = (distance[..., -1] - area[..., 0] - covered(count[-1:].expand_as(full), full)[..., 0]).clamp(min=0.0)
+    rest = (distance[..., -1] - area[..., 0] - covered(count[-1:], full, decay)[..., 0]).clamp(min=0.0)
     top_speed = (full / (1.0 - decay))[..., 0]
     steps = torch.where(can.any(-1), steps, STEPS + rest / top_speed)
 
@@ -132,14 +128,20 @@ def reach_ball(ball: Tensor, players: Tensor, types: Tensor, *, held: Tensor, ac
     sideways_rate = dash_rate(sideways)
     single = actor[:, None, None]
     own_decay, own_full = decay.gather(1, single)[:, 0], full.gather(1, single)[:, 0]
-    slide = own_full * sideways_rate / (1.0 - own_decay)
-    slide = slide * (count - own_decay * (1.0 - own_decay**count) / (1.0 - own_decay))
-    slides = slide >= distance.gather(1, own)[:, 0] - area.gather(1, single)[:, 0]
+    slides = (
+        covered(count, own_full * sideways_rate, own_decay)
+        >= distance.gather(1, own)[:, 0] - area.gather(1, single)[:, 0]
+    )
     by_sliding = torch.where(slides.any(-1), slides.to(ball.dtype).argmax(-1).to(ball.dtype), NEVER)
     own_steps = torch.minimum(steps.gather(1, actor[:, None])[:, 0], by_sliding)
     steps = steps.scatter(1, actor[:, None], own_steps[:, None])
     on_field = (players[..., CHANNEL["flags"]].long() & FLAG_ON_FIELD) != 0
     return Reach(steps=torch.where(on_field, steps.clamp(max=NEVER), NEVER), ball=path)
+
+
+def covered(cycles: Tensor, acceleration: Tensor, decay: Tensor) -> Tensor:
+    """Metres from rest in so many dashes, which add ``acceleration`` to a velocity that then decays."""
+    return acceleration / (1.0 - decay) * (cycles - decay * (1.0 - decay**cycles) / (1.0 - decay))
 
 
 def dash_rate(direction_deg: Tensor) -> Tensor:

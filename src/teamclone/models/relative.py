@@ -15,6 +15,7 @@ from torch.nn import functional
 from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.models.config import BLOCKS
 from teamclone.models.features import Normalisation, TypeParameters
+from teamclone.models.mirror import mirror_state
 from teamclone.models.physics import (
     NEVER,
     STEPS,
@@ -29,7 +30,7 @@ from teamclone.models.physics import (
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
-from teamclone.rcss.player_types import GROUPS
+from teamclone.rcss.player_types import DEFAULTS, GROUPS
 
 PAST_FRAMES = 3
 NEAREST_OPPONENTS = 6
@@ -65,15 +66,17 @@ class RelativeFeatures(nn.Module):
         blocks: some of BLOCKS; ``scene`` is always among the columns.
     """
 
-    channels = (
-        *("x", "y", "vx", "vy", "body", "neck", "view_width", "stamina", "effort", "recovery", "capacity", "type"),
-        *("flags", "last_command"),
-    )
+    signs: Tensor
 
     def __init__(self, blocks: tuple[str, ...] = BLOCKS) -> None:
         super().__init__()
         self.blocks = tuple(block for block in BLOCKS if block in blocks)
         self.history = PAST_FRAMES if "past" in blocks else 0
+        self.channels = (
+            *("x", "y", "vx", "vy", "body", "stamina", "effort", "recovery", "capacity", "type", "flags"),
+            *(("neck", "view_width") if "view" in blocks else ()),
+            "last_command",
+        )
         self.own_type = TypeParameters(tuple(GROUPS))
         parts = self._parts(_blank(self.history))
         self.names = (
@@ -82,6 +85,14 @@ class RelativeFeatures(nn.Module):
         )
         self.n_inputs = len(self.names) - len(GEOMETRY)
         self.normalisation = Normalisation(self.n_inputs)
+        self.register_buffer("signs", self._signs(), persistent=False)
+
+    def _signs(self) -> Tensor:
+        """(len(names),) -1 for columns that change their sign where left and right are exchanged, else 1."""
+        state = _any(self.history)
+        plain, mirrored = self.project(state), self.project(mirror_state(state, torch.arange(22)))
+        turned = (plain + mirrored).abs().amax(0) < (plain - mirrored).abs().amax(0)
+        return torch.where(turned, -1.0, 1.0)
 
     def columns(self, blocks: tuple[str, ...]) -> list[int]:
         """Places of the columns of ``scene`` and of some blocks."""
@@ -97,6 +108,8 @@ class RelativeFeatures(nn.Module):
     def fit(self, chunks: Iterable[Tensor]) -> None:
         """Fit the normalisation on what `project` makes of the training samples, chunk by chunk."""
         self.normalisation.fit(chunk[:, : self.n_inputs] for chunk in chunks)
+        # What changes its sign in the mirror must do so after normalisation, too.
+        self.normalisation.mean[self.signs[: self.n_inputs] < 0] = 0.0
 
     def normalise(self, columns: Tensor) -> Tensor:
         """(batch, len(names)) of what `project` gives; GEOMETRY stays."""
@@ -403,6 +416,38 @@ def _past(state: State, me: Tensor, view: _View, *, frames: int) -> Tensor:
         )
         columns.append(torch.where(known, seen, 0.0))
     return torch.cat(columns, 1)
+
+
+def _any(history: int) -> State:
+    """A few situations in which nothing is zero, equal or straight ahead."""
+    random = torch.Generator().manual_seed(0)
+    n, n_channels = 8, len(CHANNEL)
+
+    def between(low: float, high: float, *shape: int) -> Tensor:
+        return low + (high - low) * torch.rand(*shape, generator=random)
+
+    players = between(-0.4, 0.4, n, 1 + history, 22, n_channels)
+    for name, low, high in (("x", -50, 50), ("y", -30, 30), ("body", -170, 170), ("neck", -80, 80)):
+        players[..., CHANNEL[name]] = between(low, high, n, 1 + history, 22)
+    for name, value in (
+        ("effort", 1.0),
+        ("recovery", 1.0),
+        ("flags", FLAG_ON_FIELD),
+        ("last_command", CommandKind.DASH),
+    ):
+        players[..., CHANNEL[name]] = value
+    players[..., CHANNEL["stamina"]] = between(2000, 8000, n, 1 + history, 22)
+    ball = between(-1, 1, n, 1 + history, 4) * torch.tensor([50.0, 30.0, 1.0, 1.0])
+    types = torch.tensor(list(DEFAULTS.values())).expand(n, 22, -1)
+    return State(
+        ball=ball[:, 0],
+        players=players[:, 0],
+        types=types,
+        actor=torch.arange(n),
+        past_ball=ball[:, 1:],
+        past_players=players[:, 1:],
+        past_known=torch.ones(n, history, dtype=torch.bool),
+    )
 
 
 def _blank(history: int) -> State:

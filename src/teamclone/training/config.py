@@ -49,6 +49,7 @@ class TrainConfig:
         epsilon: added to the optimiser's denominator.
         parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
         parameter_weight: of the parameters' error beside that of the command.
+        aim_weight: of the error by which turns teach the aims; mixture head only.
         balance: how rare commands are made up for: none; oversample: rows of rarer commands are drawn more often, in
             an epoch of the same length; undersample: those of frequent ones less often; weights: of the cross-entropy.
         balance_strength: 1 makes all commands equally frequent, 0.5 goes half the way in the logarithm, 0 none of it.
@@ -71,6 +72,7 @@ class TrainConfig:
     epsilon: float = 1e-7
     parameter_loss: str = "paper"
     parameter_weight: float = 1.0
+    aim_weight: float = 0.0
     balance: str = "none"
     balance_strength: float = 1.0
     prior_correction: bool = True
@@ -122,6 +124,9 @@ _AT_LEAST: dict[str, float] = {
     "data.mirror": 0,
     "train.weight_decay": 0,
     "train.parameter_weight": 0,
+    "train.aim_weight": 0,
+    "model.parameter_hidden": 1,
+    "model.kick_dropout": 0,
     "train.balance_strength": 0,
     "train.epochs": 1,
     "train.threads": 0,
@@ -131,6 +136,7 @@ _AT_LEAST: dict[str, float] = {
 _ABOVE_ZERO = ("train.learning_rate", "train.epsilon")
 _AT_MOST: dict[str, float] = {
     "model.dropout": 0.9,
+    "model.kick_dropout": 0.9,
     "data.mirror": 1,
     "train.balance_strength": 1,
     "train.learning_rate": 1000,
@@ -216,7 +222,8 @@ def config_from(table: dict[str, Any], *, where: str, errors: Iterable[str] = ()
 def _idle(config: Config) -> list[str]:
     """Settings that would have no effect beside the others, and those that others need."""
     model, train = config.model, config.train
-    of_relative = ("blocks", "kick_blocks", "aims", "aim_hidden", "kick_hidden")
+    of_mixture = ("model.kick_blocks", "model.parameter_hidden", "model.kick_hidden", "model.kick_dropout")
+    of_relative = ("model.blocks", "model.aims", "model.aim_hidden", *of_mixture)
     tables = (("model", model, ModelConfig()), ("train", train, TrainConfig()))
     changed = {
         f"{section}.{item.name}"
@@ -234,7 +241,7 @@ def _idle(config: Config) -> list[str]:
     if train.balance == "none":
         idle(("train.balance_strength", "train.prior_correction"), "train.balance = none")
     if model.features == "paper":
-        idle((f"model.{name}" for name in of_relative), "model.features = paper")
+        idle(of_relative, "model.features = paper")
         if model.head == "mixture":
             problems.append("model.head = mixture needs model.features = relative")
     else:
@@ -242,11 +249,14 @@ def _idle(config: Config) -> list[str]:
         if bool(model.aims) != bool(model.aim_hidden):
             problems.append("model.aims and model.aim_hidden need each other")
         if model.head == "point":
-            idle(("model.kick_blocks", "model.kick_hidden"), "model.head = point")
-        elif not model.kick_hidden:
-            problems.append("model.head = mixture needs model.kick_hidden")
+            idle(of_mixture, "model.head = point")
+        else:
+            lacking = [name for name in ("parameter_hidden", "kick_hidden") if not getattr(model, name)]
+            problems += [f"model.head = mixture needs model.{name}" for name in lacking]
     if model.head == "mixture":
         idle(("train.parameter_loss",), "model.head = mixture")
+    if model.head == "point" or not model.aims:
+        idle(("train.aim_weight",), "model.head = point" if model.head == "point" else "model.aims = 0")
     return problems
 
 

@@ -23,7 +23,8 @@ from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.files import write_atomic
 from teamclone.models.loss import Balance, ParameterLoss
 from teamclone.models.network import Clone
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.models.state import Target
+from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.training.calibration import Calibration
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
@@ -134,6 +135,7 @@ def train(
             model.head.loss,
             parameter_loss=cast(ParameterLoss, config.train.parameter_loss),
             weight=config.train.parameter_weight,
+            aim_weight=config.train.aim_weight,
         )
         kinds = dataset.samples["kind"].numpy()[rows]
         draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(CLONED_KINDS)), device)
@@ -165,7 +167,7 @@ def train(
             for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size, mirrored=mirrored), 1):
                 for weights in optimiser.param_groups:
                     weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
-                output = answer_of(inputs)
+                output = answer_of(inputs, kicks=with_ball(target))
                 loss = loss_of(output, target, balance=balance, whole=whole)
                 optimiser.zero_grad(set_to_none=True)
                 loss.total.backward()  # type: ignore[no-untyped-call]
@@ -180,7 +182,7 @@ def train(
             scores, calibration = Scores(device), Calibration(device)
             with torch.no_grad():
                 for inputs, target, whole in feed.batches(validation_rows, batch_size):
-                    output = answer_of(inputs)
+                    output = answer_of(inputs, kicks=with_ball(target))
                     scores.add(loss_of(output, target, whole=whole), model.head.point(output), target, batch=len(whole))
                     if config.train.calibrate:
                         calibration.add(model.head.logits(output), target.kind)
@@ -202,17 +204,23 @@ def train(
     return run
 
 
-def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"]) -> Any:
-    """What the head answers to normalised inputs, as `Clone.output` does but for rounding."""
+def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kicks: Tensor | None = None) -> Any:
+    """What the head answers to normalised inputs, as `Clone.output` does but for rounding; ``kicks`` as there."""
     if precision == "bf16":
         with torch.autocast(inputs.device.type, torch.bfloat16):
-            return model.answer(inputs)
+            return model.answer(inputs, kicks=kicks)
     able = isinstance(model.trunk, nn.Sequential) and model.config.activation in ONEDNN_ACTIVATIONS
     if able and inputs.device.type == "cpu" and len(inputs) and not model.config.dropout:
         # oneDNN instead of MKL, which takes twice the time on AMD, where it leaves AVX-512 unused.
         hidden: Tensor = model.trunk(inputs.to_mkldnn()).to_dense()
         return model.head(hidden)
-    return model.answer(inputs)
+    return model.answer(inputs, kicks=kicks)
+
+
+def with_ball(target: Target) -> Tensor:
+    """(n,) where a kick or tackle was given."""
+    kick, tackle = (CLONED_KINDS.index(kind) for kind in (CommandKind.KICK, CommandKind.TACKLE))
+    return torch.nonzero((target.kind == kick) | (target.kind == tackle)).squeeze(1)
 
 
 class Journal:

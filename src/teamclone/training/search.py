@@ -302,6 +302,7 @@ class Study:
                 settings[f"data.{name}"] = int(getattr(base.data, name) * factor)
         if chosen.get("model.aims") == 0:
             settings["model.aim_hidden"] = []
+            settings["train.aim_weight"] = 0.0
         return [Trial(name=f"{len(trials):04d}", settings=settings)]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:

@@ -16,6 +16,7 @@ MIXTURE = ModelConfig(
     kick_blocks=("ball", "mates"),
     aims=2,
     aim_hidden=(8,),
+    parameter_hidden=(8,),
     kick_hidden=(8,),
     hidden=(16, 8),
     head="mixture",

@@ -11,6 +11,7 @@ from teamclone.models.loss import (
     ParameterLoss,
     command_loss,
     issued,
+    mixture_loss,
     point_loss,
     projected_parameters,
 )
@@ -86,6 +87,35 @@ def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterL
     got = torch.autograd.grad(sum(share.total for share in shares), (logits, projected))
     for one, other in zip(expected, got, strict=True):
         assert torch.allclose(one, other)
+
+
+def test_the_mixtures_loss_by_hand() -> None:
+    logits = torch.log(torch.tensor([[0.7, 0.1, 0.1, 0.1], [0.25, 0.25, 0.25, 0.25]]))
+    target = Target(*(part[:2] for part in TARGET))
+    likelihood, aims = torch.tensor([-1.0, -3.0]), torch.tensor([0.0, -8.0])
+    cross_entropy = -(log(0.7) + log(0.25)) / 2
+    loss = mixture_loss(logits, likelihood, target, aims=aims, weight=0.5, aim_weight=0.1)
+    # The mean is over all commands: half of them turn.
+    assert [float(part) for part in loss] == pytest.approx([cross_entropy + 0.5 * 2 + 0.1 * 4, cross_entropy, 2])
+    for untaught in (
+        mixture_loss(logits, likelihood, target, aims=aims),
+        mixture_loss(logits, likelihood, target, aim_weight=9.0),
+    ):
+        assert [float(part) for part in untaught] == pytest.approx([cross_entropy + 2, cross_entropy, 2])
+    shares = [
+        mixture_loss(
+            logits[row : row + 1],
+            likelihood[row : row + 1],
+            Target(target.kind[row : row + 1], target.parameters[row : row + 1]),
+            aims=aims[row : row + 1],
+            weight=0.5,
+            aim_weight=0.1,
+            whole=target.kind,
+        )
+        for row in range(2)
+    ]
+    for together, *parts in zip(loss, *shares, strict=True):
+        assert float(sum(parts)) == pytest.approx(float(together))
 
 
 def test_a_balanced_cross_entropy_by_hand() -> None:

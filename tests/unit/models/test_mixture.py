@@ -15,8 +15,11 @@ from teamclone.models.mixture import (
     LEAST_POWER,
     Mixture,
     angle_terms,
+    halves,
     log_likelihood,
+    merged,
     middle,
+    mirrored,
     power_terms,
     scale_of,
     wrap,
@@ -181,12 +184,48 @@ def test_middle_is_never_between_left_and_right() -> None:
     assert abs(float(middle(logits, centre, angle=True))) / DEGREE == pytest.approx(179)
 
 
-def test_scales_are_bounded_and_typical_for_zero() -> None:
+def test_scales_are_bounded_and_about_typical_for_zero() -> None:
     raw = torch.tensor([0.0, -1e6, 1e6])
     usual, least, most = scale_of(raw, least=0.03, typical=3.0).tolist()
-    assert usual == pytest.approx(3.03)
-    assert least == pytest.approx(0.03 + 3 * math.exp(-8))
+    # e^3 / (1 + e^3) of it, the logistic function of the distance to the bend.
+    assert usual == pytest.approx(0.03 + 3 / (1 + math.exp(-3)))
+    assert least == pytest.approx(0.03)
     assert most == pytest.approx(0.03 + 3 * math.exp(3))
+
+
+def test_scales_grow_and_can_always_come_back() -> None:
+    raw = torch.linspace(-12, 12, 200, dtype=torch.float64, requires_grad=True)
+    scales = scale_of(raw, least=0.03, typical=3.0)
+    (slope,) = torch.autograd.grad(scales.sum(), raw)
+    assert (scales.diff() > 0).all()
+    assert (slope > 0).all()
+
+
+def test_halves_and_mirrors() -> None:
+    parts = Mixture(*(torch.randn(6, 3) for _ in Mixture._fields))
+    first, second = halves(parts)
+    for whole, one, other in zip(parts, first, second, strict=True):
+        assert torch.equal(whole, torch.cat([one, other]))
+    turned = mirrored(first)
+    assert torch.equal(turned.centre, -first.centre)
+    assert turned.logits is first.logits
+    assert turned.scale is first.scale
+    for empty in halves(Mixture(*(part[:0] for part in parts))):
+        assert [part.shape for part in empty] == [(0, 3)] * 3
+
+
+def test_a_mirrored_mixture_takes_left_for_right() -> None:
+    parts, degrees = mixture([0.4, -2.0], [0.2, 0.5], [0.3, -1.0]), double(-170.0, -23.0, 0.0, 90.0)
+    assert angle_likelihood(mirrored(parts), degrees).tolist() == pytest.approx(
+        angle_likelihood(parts, -degrees).tolist()
+    )
+
+
+def test_merged_mixtures_are_their_mean() -> None:
+    one, other = mixture([20.0, 60.0], [3.0, 5.0], [4.0, 3.0]), mixture([70.0], [2.0], [-9.0])
+    power = double(0.0, 20.0, 65.0, 100.0)
+    mean = (power_likelihood(one, power) + power_likelihood(other, power)) / 2
+    assert power_likelihood(merged([one, other]), power).tolist() == pytest.approx(mean.tolist())
 
 
 @pytest.mark.parametrize("raw", [-1e4, 0.0, 1e4])

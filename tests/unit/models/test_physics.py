@@ -15,6 +15,7 @@ from teamclone.models.physics import (
     STEPS,
     Reach,
     ball_after,
+    covered,
     dash_rate,
     kick_rate,
     kickable_area,
@@ -91,6 +92,18 @@ def dashes(distance: float, types: Tensor, *, area: float) -> int:
         speed *= decay
         cycles += 1
     return cycles
+
+
+@given(cycles=st.integers(0, 40), acceleration=st.floats(0.1, 0.9), decay=st.floats(*RANGES["player_decay"]))
+@settings(max_examples=40)
+def test_metres_covered_are_the_sum_of_the_dashes(cycles: int, acceleration: float, decay: float) -> None:
+    moved, speed = 0.0, 0.0
+    for _ in range(cycles):
+        speed += acceleration
+        moved += speed
+        speed *= decay
+    got = covered(*(torch.tensor(value, dtype=torch.float64) for value in (cycles, acceleration, decay)))
+    assert float(got) == pytest.approx(moved, abs=1e-9)
 
 
 @given(

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING, FLAG_YELLOW
 from teamclone.models.config import BLOCKS
+from teamclone.models.mirror import mirror_state
 from teamclone.models.relative import CLIP, GEOMETRY, MATES, NEAREST_OPPONENTS, PAST_FRAMES, RIVALS, RelativeFeatures
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss.commands import CommandKind
@@ -80,7 +81,9 @@ def test_inputs_are_normalised_and_limited_and_geometry_stays() -> None:
     features.fit(projected.split(150))
     inputs = features.normalise(projected)
     assert torch.equal(inputs[:, features.n_inputs :], projected[:, features.n_inputs :])
-    assert inputs[:, : features.n_inputs].mean(0).abs().max() < 1e-4
+    means, sided = inputs[:, : features.n_inputs].mean(0), features.signs[: features.n_inputs] < 0
+    assert means[~sided].abs().max() < 1e-4
+    assert means[sided].abs().max() > 1e-2, "what changes its sign in the mirror is not shifted"
     strange = projected.clone()
     strange[0, 0], strange[1, 0] = 1e6, -1e6
     limited = features.normalise(strange)
@@ -391,6 +394,38 @@ def test_left_and_right_are_alike() -> None:
     sides = {name for name, is_flipped in zip(FEATURES.names, flipped & ~same, strict=True) if is_flipped}
     assert {"y", "sin", "aside", "turn_to_ball", "turn_to_meet", "mate_3_y", "self_1", "self_4", "ball_1"} <= sides
     assert not {"x", "cos", "forward", "line_x", "power", "mate_3_x", "self_0", "self_3", "ball_0"} & sides
+    assert {name for name, sign in zip(FEATURES.names, FEATURES.signs.tolist(), strict=True) if sign < 0} == sides
+
+
+def test_signs_of_blocks_hang_on_nothing_else() -> None:
+    """Neither on what other blocks there are nor on what was drawn before."""
+    signs = dict(zip(FEATURES.names, FEATURES.signs.tolist(), strict=True))
+    for seed, blocks in enumerate((("self",), ("view", "past"), ("opponents", "rivals", "mates"))):
+        torch.manual_seed(seed)
+        some = RelativeFeatures(blocks)
+        assert dict(zip(some.names, some.signs.tolist(), strict=True)) == {name: signs[name] for name in some.names}
+
+
+def test_normalised_inputs_are_mirrored_by_their_signs() -> None:
+    """Also where the samples lean to one side, and where inputs are limited."""
+    features = RelativeFeatures(("self", "ball", "mates"))
+    state = situations(60)
+    features.fit([features.project(state)[:20]])
+    features.normalisation.std[: features.n_inputs] *= 0.1
+    mirrored = features(mirror_state(state, torch.arange(22)))
+    torch.testing.assert_close(mirrored, features(state) * features.signs, atol=1e-3, rtol=1e-3)
+
+
+def test_channels_are_those_that_the_blocks_look_at() -> None:
+    for blocks in ((), ("self", "mates", "past"), ("view",)):
+        features = RelativeFeatures(blocks)
+        state = situations(5, history=features.history)
+        before = features.project(state)
+        unread = [CHANNEL[name] for name in CHANNEL if name not in features.channels]
+        for players in (state.players, state.past_players):
+            players[..., unread] = math.nan
+        assert torch.equal(features.project(state), before)
+        assert ("neck" in features.channels) == ("view_width" in features.channels) == ("view" in blocks)
 
 
 MEETING = {"scene", "reach", "geometry", "lines", "mates", "opponents", "rivals"}

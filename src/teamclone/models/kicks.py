@@ -1,0 +1,93 @@
+"""Kicks: the velocity that the ball is to have, from which physics gives power and direction.
+
+A kick adds to the velocity that the ball already has, seen from a body that may face anywhere. What a player wants is
+simpler: the ball with a team mate, in the goal, or so far ahead that he has it again after a few dashes.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from teamclone.models.aims import geometry_of
+from teamclone.models.features import BALL_DECAY
+from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
+from teamclone.models.physics import covered
+from teamclone.models.relative import GEOMETRY, MATES
+from teamclone.rcss import pitch
+
+FREE = 3
+"""Components that begin at the ball itself."""
+DRIBBLES = (1, 2, 3, 4, 5, 7, 10)
+"""Cycles after which a dribbler wants the ball before him."""
+LEAD_M = 12.0
+"""How far from a team mate, the goal's middle or the ball what is aimed at may lie, for an output of 1."""
+TOUCH_M = 3.0
+"""The same of a dribble, from where he then is."""
+AHEAD_M = 0.6
+"""Where a dribbler likes to have the ball."""
+BALL_SPEED_MAX = 3.0
+"""rcssserver `serverparam.cpp`: ball_speed_max."""
+COUNT = MATES + 1 + FREE + len(DRIBBLES)
+
+
+class Kicks(nn.Module):
+    """Mixtures of power and direction of a kick, both with the shares of the same COUNT components.
+
+    Args:
+        width: of what a kick is decided on.
+    """
+
+    goal: Tensor
+    cycles: Tensor
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.layer = nn.Linear(width, 6 * COUNT)
+        self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
+        self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
+
+    def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
+        """Power and direction (radians from the body).
+
+        Args:
+            hidden: (batch, width). geometry: (batch, len(GEOMETRY)).
+        """
+        raw = self.layer(hidden).float().view(-1, 6, COUNT)
+        with torch.autocast(hidden.device.type, enabled=False):
+            logits, ahead, aside, speed, power_scale, angle_scale = raw.unbind(1)
+            aimed = COUNT - len(DRIBBLES)
+            wanted = torch.cat(
+                [
+                    self._aimed(ahead[:, :aimed], aside[:, :aimed], speed[:, :aimed], geometry),
+                    self._dribbled(ahead[:, aimed:], aside[:, aimed:], geometry),
+                ],
+                1,
+            )
+            vx, vy, cos, sin, gain = geometry_of(geometry, "ball_vx", "ball_vy", "cos", "sin", "kick_gain")
+            x, y = wanted[..., 0] - vx, wanted[..., 1] - vy
+            power = torch.sqrt(x.square() + y.square() + 1e-6) / gain.clamp(min=5e-3)
+            angle = torch.atan2(y * cos - x * sin, x * cos + y * sin)
+            return (
+                Mixture(logits, power.clamp(max=150.0), scale_of(power_scale, least=LEAST_POWER, typical=5.0)),
+                Mixture(logits, angle, scale_of(angle_scale, least=LEAST_ANGLE, typical=6 * DEGREE)),
+            )
+
+    def _aimed(self, ahead: Tensor, aside: Tensor, speed: Tensor, geometry: Tensor) -> Tensor:
+        """(batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""
+        mates = geometry[:, len(GEOMETRY) - 2 * MATES :].reshape(-1, MATES, 2)
+        ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)[:, None]
+        base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, FREE, -1)], 1)
+        way = base + LEAD_M * torch.stack([ahead, aside], -1) - ball
+        direction = way / torch.sqrt(way.square().sum(-1, keepdim=True) + 1e-6)
+        return direction * (BALL_SPEED_MAX * torch.sigmoid(speed))[..., None]
+
+    def _dribbled(self, ahead: Tensor, aside: Tensor, geometry: Tensor) -> Tensor:
+        """(batch, components, 2) velocities that bring the ball before him after a kick and dashes straight on."""
+        decay, forward, sideways, gain = geometry_of(geometry, "decay", "forward", "aside", "dash_gain")
+        coasted = (1 - decay**self.cycles) / (1 - decay)
+        run = forward * coasted + covered(self.cycles - 1, 100.0 * gain, decay)
+        along, across = run + AHEAD_M + TOUCH_M * ahead, sideways * coasted + TOUCH_M * aside
+        x, y, cos, sin, ball_x, ball_y = geometry_of(geometry, "x", "y", "cos", "sin", "ball_x", "ball_y")
+        way = torch.stack([x + along * cos - across * sin - ball_x, y + along * sin + across * cos - ball_y], -1)
+        return way * ((1 - BALL_DECAY) / (1 - BALL_DECAY**self.cycles))[:, None]

@@ -229,12 +229,12 @@ class MixtureHead(nn.Module):
         both = self.kick(situation.kick, situation.kick_geometry)
         tackle = self.tackle(situation.kick).float()
         (power, power_mirrored), (direction, direction_mirrored) = (mixture.halves(part) for part in both)
-        plain, tackle_mirrored = tackle.chunk(2)
         # Class k lies at k steps, its mirror at -k.
         opposite = torch.remainder(-torch.arange(TACKLE_DIRECTIONS, device=tackle.device), TACKLE_DIRECTIONS)
+        n = tackle.shape[0] // 2
         return (
-            Kick(power, direction, plain),
-            Kick(power_mirrored, mixture.mirrored(direction_mirrored), tackle_mirrored[:, opposite]),
+            Kick(power, direction, tackle[:n]),
+            Kick(power_mirrored, mixture.mirrored(direction_mirrored), tackle[n:, opposite]),
         )
 
     @staticmethod

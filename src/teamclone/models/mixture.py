@@ -101,8 +101,9 @@ def log_likelihood(logits: Tensor, terms: Tensor) -> Tensor:
 
 def halves(parts: Mixture) -> tuple[Mixture, Mixture]:
     """Those of the first and of the second half of the batch."""
-    (first, second), (centre, other_centre), (scale, other_scale) = (part.chunk(2) for part in parts)
-    return Mixture(first, centre, scale), Mixture(second, other_centre, other_scale)
+    # Not by chunk, which torch.export knows for one length of the batch only.
+    n = parts.centre.shape[0] // 2
+    return Mixture(*(part[:n] for part in parts)), Mixture(*(part[n:] for part in parts))
 
 
 def mirrored(angles: Mixture) -> Mixture:

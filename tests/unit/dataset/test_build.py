@@ -19,13 +19,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import torch
 
 from disk import small_disk
 from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
-from teamclone.dataset.layout import Split
+from teamclone.dataset.layout import FLAG_GOALIE, Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import ClusterError, DatasetError, StoreError, UsageError
 from teamclone.logs import read_match
+from teamclone.models.state import CHANNEL
 from teamclone.store import Store, create_store, open_store
 
 TEAM = "HELIOS_base"
@@ -166,6 +168,47 @@ def test_a_match_against_an_unseen_team_is_unseen_from_both_sides(store: Store, 
     (pair,) = {(row["left_name"], row["right_name"]) for row in store.matches().to_pylist()}
     report = build_dataset(DatasetConfig(teams=pair, unseen=pair[1:]), store=store, out=tmp_path / "ds", jobs=1)
     assert {match["split"] for match in report["matches"]} == {"unseen"}
+
+
+def test_goalkeepers_are_for_training_only(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    found = {}
+    for keepers in (False, True):
+        made = dataclasses.replace(config, train_goalkeepers=keepers)
+        report = build_dataset(made, store=store, out=tmp_path / str(keepers), jobs=1)
+        dataset = open_dataset(tmp_path / str(keepers))
+        assert dataset.meta["options"]["train_goalkeepers"] is keepers
+        splits, n = dataset.samples["split"].numpy(), np.arange(len(dataset))
+        state = dataset.state(n)
+        flags = state.players[n, state.actor, CHANNEL["flags"]].numpy().astype(int)
+        keeper = (flags & FLAG_GOALIE) != 0
+        assert keeper.any() == keepers
+        assert set(splits[keeper].tolist()) <= {Split.TRAIN}
+        assert {split for split, rows in report["rows"].items() if any(rows.values())} == {
+            "train",
+            "validation",
+            "test",
+        }
+        found[keepers] = [dataset.target(n[~keeper]), splits[~keeper]]
+    # Nothing else is changed by them.
+    assert torch.equal(found[True][0].parameters, found[False][0].parameters)
+    np.testing.assert_array_equal(found[True][1], found[False][1])
+
+
+def test_goalkeepers_stay_out_of_a_match_against_an_unseen_team(store: Store, tmp_path: Path) -> None:
+    (pair,) = {(row["left_name"], row["right_name"]) for row in store.matches().to_pylist()}
+    counts = []
+    for keepers in (False, True):
+        config = DatasetConfig(teams=pair[:1], unseen=pair[1:], train_goalkeepers=keepers)
+        build_dataset(config, store=store, out=tmp_path / str(keepers), jobs=1)
+        counts.append(len(open_dataset(tmp_path / str(keepers))))
+    assert counts[0] == counts[1]
+
+
+def test_goalkeepers_need_a_split_by_match(store: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    config = dataclasses.replace(config, split=SplitBy.ROWS, train_goalkeepers=True)
+    with pytest.raises(UsageError, match=r"--train-goalkeepers keeps goalkeepers out .*; it needs --split match"):
+        build_dataset(config, store=store, out=tmp_path / "ds", jobs=1)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

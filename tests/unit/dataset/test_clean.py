@@ -112,6 +112,25 @@ def test_each_rule_drops_what_it_names() -> None:
     }
 
 
+def test_the_goalkeepers_commands_may_be_kept() -> None:
+    frames, players = made_match()
+    for slot in (0, 1):
+        execute(players, 1, slot, CommandKind.DASH)
+    commands = table(
+        command(1, 1, CommandKind.DASH, 30.0, 0.0),
+        command(1, 2, CommandKind.DASH, 70.0, 0.0),
+        command(2, 1, CommandKind.CATCH, 10.0),  # is no clone's command
+    )
+    field = clean_match(frames, players, commands, {}, side=1)
+    both = clean_match(frames, players, commands, {}, side=1, goalkeepers=True)
+    assert field.samples["player"].tolist() == [1]
+    assert both.samples["player"].tolist() == [0, 1]
+    assert both.samples["parameters"].tolist() == [[30.0, 0.0], [70.0, 0.0]]
+    assert rules(both)["of field players"] == 0
+    # Cycles without a command are those of field players, as ever.
+    assert (both.player_cycles, both.idle, both.frozen) == (field.player_cycles, field.idle, field.frozen)
+
+
 def test_received_commands_stay_with_their_mark() -> None:
     frames, players = made_match()
     execute(players, 1, 1, CommandKind.DASH)

@@ -119,6 +119,9 @@ def test_overrides_are_read_as_their_setting_wants() -> None:
         ("model.all_types=kick,kick", "model.all_types: names one more than once"),
         ("model.hidden=[]", "model.hidden: expected at least one width"),
         ("model.hidden=[0]", "model.hidden: expected at least 1, got 0"),
+        ("model.parameter_hidden=[0]", "model.parameter_hidden: expected at least 1, got 0"),
+        ("model.kick_dropout=1", "model.kick_dropout: expected at most 0.9, got 1"),
+        ("train.aim_weight=-1", "train.aim_weight: expected at least 0, got -1"),
         ("model.features=papr", "model.features: no 'papr'; did you mean paper?"),
     ],
 )
@@ -141,7 +144,7 @@ def test_a_setting_without_effect_is_refused() -> None:
         load_config("small", ["train.optimiser=rmsprop", "train.betas=[0.8, 0.9]"])
 
 
-MIXTURE = ["model.head=mixture", "model.kick_hidden=[8]"]
+MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidden=[8]"]
 
 
 @pytest.mark.parametrize(
@@ -156,6 +159,9 @@ MIXTURE = ["model.head=mixture", "model.kick_hidden=[8]"]
         (["model.aims=2"], "model.aims has no effect with model.features = paper"),
         (["model.aim_hidden=[8]"], "model.aim_hidden has no effect with model.features = paper"),
         (["model.kick_hidden=[8]"], "model.kick_hidden has no effect with model.features = paper"),
+        (["model.parameter_hidden=[8]"], "model.parameter_hidden has no effect with model.features = paper"),
+        (["model.kick_dropout=0.1"], "model.kick_dropout has no effect with model.features = paper"),
+        (["train.aim_weight=0.1"], "train.aim_weight has no effect with model.head = point"),
         (["model.head=mixture"], "model.head = mixture needs model.features = relative"),
         (["model.features=relative", "model.own_type=true"], "model.own_type has no effect with model.features = rel"),
         (
@@ -172,7 +178,19 @@ MIXTURE = ["model.head=mixture", "model.kick_hidden=[8]"]
             ["model.features=relative", "model.kick_hidden=[8]"],
             "model.kick_hidden has no effect with model.head = poin",
         ),
-        (["model.features=relative", "model.head=mixture"], "model.head = mixture needs model.kick_hidden"),
+        (
+            ["model.features=relative", "model.parameter_hidden=[8]"],
+            "model.parameter_hidden has no effect with model.head = point",
+        ),
+        (
+            ["model.features=relative", "model.kick_dropout=0.1"],
+            "model.kick_dropout has no effect with model.head = point",
+        ),
+        (
+            ["model.features=relative", "model.head=mixture"],
+            "model.head = mixture needs model.parameter_hidden; model.head = mixture needs model.kick_hidden",
+        ),
+        (["model.features=relative", *MIXTURE, "train.aim_weight=1"], "train.aim_weight has no effect with model.aims"),
         (
             ["model.features=relative", *MIXTURE, "train.parameter_loss=masked"],
             "train.parameter_loss has no effect with model.head = mixture",
@@ -194,6 +212,7 @@ def test_useless_and_lacking_combinations_are_refused(settings: list[str], answe
         ["train.parameter_loss=masked"],
         MIXTURE,
         [*MIXTURE, "model.kick_blocks=self,ball", "model.aims=1", "model.aim_hidden=8"],
+        [*MIXTURE, "model.kick_dropout=0.5", "model.aims=1", "model.aim_hidden=8", "train.aim_weight=0.1"],
     ],
 )
 def test_combinations_that_go_together(settings: list[str]) -> None:

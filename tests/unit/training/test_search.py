@@ -174,9 +174,10 @@ def test_a_study_may_leave_the_aims_out() -> None:
     trials: list[Trial] = []
     while found := plan.propose(trials):
         trials.append(finish(found[0], 0.5))
-    models = [with_settings(plan.config.base, trial.settings).model for trial in trials]
-    assert {model.aims for model in models} == {0, 2, 4, 6, 8, 10, 12}
-    assert all(bool(model.aims) == bool(model.aim_hidden) for model in models)
+    configs = [with_settings(plan.config.base, trial.settings) for trial in trials]
+    assert {config.model.aims for config in configs} == {0, 2, 4, 6, 8, 10, 12}
+    for config in configs:
+        assert bool(config.model.aims) == bool(config.model.aim_hidden) == bool(config.train.aim_weight)
 
 
 def test_a_study_is_the_same_whenever_it_is_gone_on_with() -> None:
@@ -191,7 +192,8 @@ def test_a_study_is_the_same_whenever_it_is_gone_on_with() -> None:
 def test_a_study_varies_neither_what_is_held_nor_what_has_no_effect() -> None:
     assert "train.learning_rate" not in study(held=("train.learning_rate",)).space()
     assert "train.weight_decay" not in study("paper", ("train.optimiser=adagrad",)).space()
-    assert "model.aims" not in study("best", ("model.aims=0", "model.aim_hidden=[]")).space()
+    no_aims = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0")
+    assert "model.aims" not in study("best", no_aims).space()
     assert (
         768
         not in study("paper", ("data.batch_size=384", "data.batches_per_epoch=3")).space()["data.batch_size"].choices

@@ -1,0 +1,205 @@
+"""Kicks: power and direction from a wanted velocity by hand, and that left and right are alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+import torch
+from tests.situations import situations
+
+from teamclone.models.config import ModelConfig
+from teamclone.models.kicks import AHEAD_M, BALL_SPEED_MAX, COUNT, DRIBBLES, FREE, LEAD_M, TOUCH_M, Kicks
+from teamclone.models.mirror import mirror_state, mirror_target
+from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
+from teamclone.models.network import Clone
+from teamclone.models.relative import GEOMETRY, MATES
+from teamclone.models.state import State, Target
+from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
+
+GOAL, AIMED = MATES, MATES + 1 + FREE
+"""Places of the goal's component and of the first dribble."""
+USUAL = 1 / (1 + math.exp(-3))
+"""What an output of 0 leaves of a typical scale."""
+OUTPUTS = ("share", "ahead", "aside", "speed", "power", "direction")
+
+
+def geometry(**values: float) -> torch.Tensor:
+    """One situation: the player at (10, -5) faces +y; the ball lies at (10, -4), unmoving; mates are where he is."""
+    usual = {"x": 10, "y": -5, "cos": 0, "sin": 1, "decay": 0.4, "dash_gain": 0.006, "ball_x": 10, "ball_y": -4}
+    usual |= {"kick_gain": 0.02}
+    usual |= {f"mate_{mate}_{axis}": usual[axis] for mate in range(MATES) for axis in "xy"}
+    return torch.tensor([[float((usual | values).get(name, 0.0)) for name in GEOMETRY]])
+
+
+def kick(*, component: int = 0, outputs: dict[str, float] | None = None, **values: float) -> list[float]:
+    """Power and degrees of a component whose outputs are 0 but for the given ones."""
+    kicks = Kicks(3)
+    with torch.no_grad():
+        kicks.layer.weight.zero_()
+        kicks.layer.bias.zero_()
+        for name, value in (outputs or {}).items():
+            kicks.layer.bias.view(6, COUNT)[OUTPUTS.index(name), component] = value
+        power, direction = kicks(torch.zeros(1, 3), geometry(**values))
+    assert power.logits is direction.logits
+    return [float(power.centre[0, component]), float(direction.centre[0, component]) / DEGREE]
+
+
+def needed(wanted: Sequence[float], *, gain: float = 0.02, motion: Sequence[float] = (0.0, 0.0)) -> list[float]:
+    """The kick of one who faces +y that gives the ball a velocity."""
+    x, y = wanted[0] - motion[0], wanted[1] - motion[1]
+    return [math.hypot(x, y) / gain, math.degrees(math.atan2(-x, y))]
+
+
+def towards(x: float, y: float, speed: float) -> list[float]:
+    """A velocity from where the ball is."""
+    way = math.hypot(x - 10, y + 4)
+    return [speed * (x - 10) / way, speed * (y + 4) / way]
+
+
+def test_a_pass_at_half_speed() -> None:
+    """An output of 0 is half of the ball's greatest speed, straight to the team mate."""
+    got = kick(component=2, mate_2_x=30.0, mate_2_y=-4.0)
+    assert got == pytest.approx([1.5 / 0.02, -90.0], abs=1e-2)
+    assert BALL_SPEED_MAX == 3.0
+
+
+def test_a_pass_stops_what_the_ball_does() -> None:
+    """Straight +x at 1.5, of a ball that already moves (0.5, -0.3): (1.0, 0.3) is lacking."""
+    got = kick(component=2, mate_2_x=30.0, mate_2_y=-4.0, ball_vx=0.5, ball_vy=-0.3)
+    assert got == pytest.approx(needed((1.5, 0), motion=(0.5, -0.3)), abs=1e-2)
+    assert got == pytest.approx([math.hypot(1, 0.3) / 0.02, -math.degrees(math.atan2(1, 0.3))], abs=1e-2)
+
+
+def test_a_pass_leads_the_team_mate() -> None:
+    """Outputs of 1 and -0.5: 12 m before him and 6 m to his right, on the pitch."""
+    got = kick(component=0, outputs={"ahead": 1.0, "aside": -0.5, "speed": 2.0}, mate_0_x=20.0, mate_0_y=11.0)
+    speed = 3 / (1 + math.exp(-2))
+    assert got == pytest.approx(needed(towards(20 + LEAD_M, 11 - LEAD_M / 2, speed)), abs=2e-2)
+
+
+def test_a_shot_goes_to_the_middle_of_the_goal() -> None:
+    assert kick(component=GOAL) == pytest.approx(needed(towards(52.5, 0, 1.5)), abs=1e-2)
+
+
+def test_a_free_kick_goes_where_its_outputs_say() -> None:
+    """Seen from the ball: with no way at all the ball is stopped."""
+    outputs = {"ahead": -0.25, "aside": 0.25}
+    assert kick(component=GOAL + 1, outputs=outputs) == pytest.approx(needed(towards(7, -1, 1.5)), abs=1e-2)
+    assert kick(component=GOAL + FREE, ball_vy=0.8)[0] == pytest.approx(0.8 / 0.02, abs=0.1)
+
+
+@pytest.mark.parametrize("number", range(len(DRIBBLES)))
+def test_a_dribble_has_the_ball_before_him_after_a_kick_and_dashes(number: int) -> None:
+    """Played cycle by cycle: the kick, then full dashes straight on, until the ball lies AHEAD_M before him."""
+    cycles = DRIBBLES[number]
+    motion, ball_motion = (-0.05, 0.3), (0.1, 0.2)
+    values = {"forward": 0.3, "aside": 0.05, "ball_vx": ball_motion[0], "ball_vy": ball_motion[1]}
+    power, degrees = kick(component=AIMED + number, **values)
+    assert power < 150
+    # He faces +y: to the left is -x.
+    ball_vx = ball_motion[0] - 0.02 * power * math.sin(math.radians(degrees))
+    ball_vy = ball_motion[1] + 0.02 * power * math.cos(math.radians(degrees))
+    (x, y), (vx, vy), (ball_x, ball_y) = (10.0, -5.0), motion, (10.0, -4.0)
+    for cycle in range(cycles):
+        vy += 0.6 if cycle else 0.0
+        x, y, ball_x, ball_y = x + vx, y + vy, ball_x + ball_vx, ball_y + ball_vy
+        vx, vy, ball_vx, ball_vy = 0.4 * vx, 0.4 * vy, 0.94 * ball_vx, 0.94 * ball_vy
+    assert (ball_x - x, ball_y - y) == pytest.approx((0.0, AHEAD_M), abs=1e-3)
+
+
+def test_a_dribble_may_go_aside() -> None:
+    """In one cycle a player at rest stays; 3 m an output, forward and to the left, which is -x."""
+    got = kick(component=AIMED, outputs={"ahead": 0.2, "aside": 0.5})
+    assert got == pytest.approx(needed((-TOUCH_M * 0.5, -5 + AHEAD_M + TOUCH_M * 0.2 + 4)), abs=1e-2)
+
+
+def test_powers_beyond_reach_are_bounded() -> None:
+    """So that a component that nobody could kick still has a gradient near what the server clips."""
+    assert kick(component=GOAL, kick_gain=0.0)[0] == 150
+    assert kick(component=GOAL, outputs={"speed": -9.0}, kick_gain=0.0)[0] == pytest.approx(0.37 / 5, abs=0.3)
+
+
+def test_scales_are_typical() -> None:
+    kicks = Kicks(3)
+    with torch.no_grad():
+        kicks.layer.weight.zero_()
+        kicks.layer.bias.zero_()
+        power, direction = kicks(torch.zeros(1, 3), geometry())
+    assert power.scale[0].tolist() == pytest.approx([LEAST_POWER + 5 * USUAL] * COUNT)
+    assert direction.scale[0].tolist() == pytest.approx([LEAST_ANGLE + 6 * DEGREE * USUAL] * COUNT)
+
+
+# Left and right.
+
+MODEL = ModelConfig(
+    features="relative",
+    blocks=("self", "role", "ball"),
+    kick_blocks=("self", "type", "last", "ball", "reach", "lines", "mates", "opponents", "rivals"),
+    aims=2,
+    aim_hidden=(8,),
+    parameter_hidden=(8,),
+    kick_hidden=(32,),
+    kick_dropout=0.3,
+    hidden=(16,),
+    head="mixture",
+)
+
+
+@pytest.fixture(scope="module")
+def model() -> Clone:
+    torch.manual_seed(0)
+    model = Clone(MODEL)
+    # Of samples that lean to one side.
+    state = situations(100, seed=5)
+    model.inputs.fit([model.inputs.project(State(*(tensor[state.ball[:, 1] > 0] for tensor in state)))])
+    return model.eval()
+
+
+def mirrored(state: State) -> State:
+    return mirror_state(state, torch.arange(22))
+
+
+def assert_alike(one: Mixture, other: Mixture, *, turned: bool) -> None:
+    torch.testing.assert_close(one.logits, other.logits, atol=1e-3, rtol=1e-3)
+    torch.testing.assert_close(one.scale, other.scale, atol=1e-3, rtol=1e-3)
+    away = wrap(one.centre + other.centre) if turned else one.centre - other.centre
+    assert away.abs().max() < 1e-2
+
+
+def test_a_mirrored_situation_has_the_mirrored_kicks(model: Clone) -> None:
+    state = situations(60)
+    with torch.no_grad():
+        answers, turned = model.output(state).kick, model.output(mirrored(state)).kick
+    for one, other in zip(answers, reversed(turned), strict=True):
+        assert_alike(one.power, other.power, turned=False)
+        assert_alike(one.direction, other.direction, turned=True)
+        opposite = [-k % one.tackle.shape[1] for k in range(one.tackle.shape[1])]
+        torch.testing.assert_close(one.tackle, other.tackle[:, opposite], atol=1e-3, rtol=1e-3)
+    # Neither answer by itself is.
+    assert (answers[0].power.centre - turned[0].power.centre).abs().max() > 1
+
+
+def test_mirrored_kicks_are_as_likely(model: Clone) -> None:
+    state = situations(60)
+    generator = torch.Generator().manual_seed(0)
+    kick, tackle = (CLONED_KINDS.index(kind) for kind in (CommandKind.KICK, CommandKind.TACKLE))
+    kind = torch.tensor([kick, tackle]).repeat(30)
+    values = torch.rand(60, 2, generator=generator)
+    power, direction = 100 * values[:, 0], 360 * values[:, 1] - 180
+    first = torch.where(kind == kick, power, (direction / 9).round() * 9)
+    target = Target(kind, torch.stack([first, torch.where(kind == kick, direction, 0.0)], 1))
+    with torch.no_grad():
+        likelihood = model.head.log_likelihood(model.output(state), target)
+        turned = model.head.log_likelihood(model.output(mirrored(state)), mirror_target(target))
+    torch.testing.assert_close(likelihood, turned, atol=2e-2, rtol=1e-3)
+
+
+def test_the_single_answer_is_mirrored(model: Clone) -> None:
+    state = situations(60)
+    parameters, turned = (model.predict(of)[1] for of in (state, mirrored(state)))
+    for parameter, values, others in zip(PARAMETERS[3:], parameters.T[3:], turned.T[3:], strict=True):
+        away = wrap((values + others) * DEGREE) / DEGREE if parameter.angle else values - others
+        # Of two components that are as near to the median rounding may take either.
+        assert (away.abs() < 0.5).float().mean() > 0.95, parameter.name

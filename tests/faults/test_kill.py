@@ -23,7 +23,16 @@ from command import TEAMCLONE, teamclone
 
 FIXTURES = ("v6", "json", "native-v4", "native-v5", "oddname", "realtime")
 MATCH = ("--team", "HELIOS_base", "--split", "rows")
-SHORT = ("--set", "train.epochs=6", "--set", "data.batches_per_epoch=8", "--set", "model.hidden=[32]")
+SHORT = (
+    "--preset",
+    "small",
+    "--set",
+    "train.epochs=6",
+    "--set",
+    "data.batches_per_epoch=8",
+    "--set",
+    "model.hidden=[32]",
+)
 TIMES = ("samples_per_s", "seconds")
 
 

@@ -23,14 +23,17 @@ from teamclone.training.run import open_run
 
 COMMAND = (sys.executable, "-c", "from teamclone.cli import main; main()", "train")
 TINY = [
-    f"--set={text}"
-    for text in (
-        "model.hidden=[16]",
-        "data.batch_size=64",
-        "data.batches_per_epoch=3",
-        "train.threads=1",
-        "train.precision=fp32",
-    )
+    "--preset=small",
+    *(
+        f"--set={text}"
+        for text in (
+            "model.hidden=[16]",
+            "data.batch_size=64",
+            "data.batches_per_epoch=3",
+            "train.threads=1",
+            "train.precision=fp32",
+        )
+    ),
 ]
 
 

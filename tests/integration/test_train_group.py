@@ -54,7 +54,7 @@ def torchrun(dataset: Path, out: Path, *options: str) -> subprocess.CompletedPro
 
 
 def sets(*more: str) -> list[str]:
-    return [f"--set={setting}" for setting in (*SETTINGS, *more)]
+    return ["--preset=small", *(f"--set={setting}" for setting in (*SETTINGS, *more))]
 
 
 def assert_same_but_for_rounding(one: Run, other: Run) -> None:

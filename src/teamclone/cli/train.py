@@ -33,7 +33,7 @@ def train(
     out: Annotated[Path, typer.Option("--out", help="Run folder to make, or to go on with.")],
     preset: Annotated[
         str | None,
-        typer.Option(help="Settings to start from: best, paper or small; default small.", show_default=False),
+        typer.Option(help="Settings to start from: best, paper or small; default best.", show_default=False),
     ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change one setting: train.epochs=50.")
@@ -49,7 +49,7 @@ def train(
     from teamclone.training.config import load_config, override
 
     # Before PyTorch is imported: a wrong setting is told at once.
-    config = load_config(preset or "small", overrides or [])
+    config = load_config(preset or "best", overrides or [])
 
     if resume and preset is None:
         from teamclone.training.run import open_run

@@ -163,7 +163,7 @@ def preset_text(name: str) -> str:
     return (resources.files("teamclone.training") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load_config(preset: str = "small", overrides: Sequence[str] = ()) -> Config:
+def load_config(preset: str = "best", overrides: Sequence[str] = ()) -> Config:
     """A preset with single values overridden, each as ``section.key=value``.
 
     Raises:

@@ -42,6 +42,7 @@ from teamclone.errors import TeamcloneError
 from teamclone.evaluation import baselines, metrics
 from teamclone.evaluation.evaluate import KINDS, count_training, describe, predict, truth, write_json
 from teamclone.evaluation.outcome import Outcome
+from teamclone.machine import processor
 from teamclone.models.config import BLOCKS
 from teamclone.models.network import parameter_count
 from teamclone.models.physics import kickable_area, reach_ball
@@ -310,7 +311,7 @@ class Work:
             return
         print(f"{name} ...", file=sys.stderr, flush=True)
         machine = {
-            "processor": _processor(),
+            "processor": processor(),
             "threads": torch.get_num_threads(),
             "python": platform.python_version(),
             "torch": torch.__version__,
@@ -479,14 +480,6 @@ def _whole(settings: dict[str, Any]) -> dict[str, Any]:
     """Settings of a result with defaults where it was made before a setting was known."""
     config = settings.get("config")
     return settings if config is None else {**settings, "config": to_table(config_from(config, where="a result"))}
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), platform.processor())
 
 
 def chunks(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

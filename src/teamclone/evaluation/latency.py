@@ -16,6 +16,7 @@ import teamclone
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
 from teamclone.evaluation.evaluate import read_document
+from teamclone.machine import processor
 from teamclone.models.network import model_id
 from teamclone.models.state import State
 
@@ -69,7 +70,7 @@ def measure_latency(
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "model_id": model_id(model),
         "versions": {"teamclone": teamclone.__version__, "torch": torch.__version__, "numpy": np.__version__},
-        "machine": {"processor": _processor(), "system": platform.platform(terse=True), "threads": 1},
+        "machine": {"processor": processor(), "system": platform.platform(terse=True), "threads": 1},
         "single": _summary(single),
         "team": {"states": TEAM, **_summary(team), "states_per_second": float(TEAM / np.mean(team) * 1e6)},
         "histogram": {
@@ -110,17 +111,6 @@ def _summary(times: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, f
         "p99_us": float(np.quantile(times, 0.99)),
         "max_us": float(times.max()),
     }
-
-
-def _processor() -> str:
-    """The processor's name, where the system tells it."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def load_bench(path: Path | str) -> dict[str, Any]:

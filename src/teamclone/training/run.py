@@ -32,6 +32,7 @@ from teamclone import __version__
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError, UsageError
 from teamclone.files import write_atomic
+from teamclone.machine import processor
 from teamclone.models.network import Clone
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.training.checkpoint import load_weights, save_weights
@@ -272,15 +273,7 @@ def _environment(dataset: Dataset) -> dict[str, Any]:
         "torch": torch.__version__,
         "numpy": np.__version__,
         "platform": platform.platform(),
-        "processor": _processor(),
+        "processor": processor(),
         "threads": torch.get_num_threads(),
         "cuda": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
     }
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), platform.processor())

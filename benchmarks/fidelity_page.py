@@ -173,8 +173,9 @@ def _protocol(cleaning: Mapping[str, Any]) -> str:
     return f"""## Protocol
 
 Whole matches are for training, validation or test, never for two of these. A row is a command that the server
-received of a field player in play_on; who keeps the goal is told by the log, not by his number. Validation chose the
-settings and the checkpoint (`best-loss`); the test matches and the unseen opponent were looked at only to write this
+received of a field player in play_on; who keeps the goal is told by the log, not by his number. Goalkeepers' commands
+are among the rows for training, and in no other split. Validation chose the settings and the checkpoint (`best-loss`);
+the test matches and the unseen opponent were looked at only to write this
 page. Cells with slashes give the sets in one order: each test match, then all matches of the unseen opponent.
 
 {table(("split", "opponent", "matches", *KINDS), rows)}"""

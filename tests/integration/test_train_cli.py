@@ -86,6 +86,13 @@ def test_trains_reports_and_resumes(dataset: Path, tmp_path: Path, teamclone: Ca
     assert answer["last"]["epoch"] == 3
     assert answer["best"]["best-loss"]["figure"] == "validation_loss"
     assert open_run(tmp_path / "run").config.train.epochs == 3
+    # A setting of the paper's inputs, which the default preset does not have, says again what the run was made with.
+    code, _, err = teamclone(
+        *(dataset, "--out", tmp_path / "run", "--resume"),
+        *("--set", "train.epochs=4", "--set", "model.own_type=false", "--set", "train.parameter_loss=masked"),
+    )
+    assert code == 1
+    assert "cannot resume with other settings (train.parameter_loss: paper became masked)" in err
 
 
 @pytest.mark.parametrize("killed_by", [signal.SIGKILL, signal.SIGINT])

@@ -48,13 +48,12 @@ def train(
     """Train a clone on a dataset. The run folder is all that evaluation and export need."""
     from teamclone.training.config import load_config, override
 
-    # Before PyTorch is imported: a wrong setting is told at once.
-    config = load_config(preset or "best", overrides or [])
-
     if resume and preset is None:
         from teamclone.training.run import open_run
 
         config = override(open_run(out).config, overrides or [])
+    else:  # Before PyTorch is imported: a wrong setting is told at once.
+        config = load_config(preset or "best", overrides or [])
     run_training(config, dataset, out, resume=resume, as_json=as_json)
 
 

@@ -189,9 +189,12 @@ def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
     options = data["options"] or {}
     build = ["teamclone dataset --store STORE", *(f"--team {shlex.quote(team)}" for team in data["teams"])]
     for key, value in options.items():
-        if key == "team" or value is None or value == []:
+        if key == "team" or value is None or value is False or value == []:
             continue
         name = {"test_matches": "test-match", "validation_matches": "validation-match"}.get(key, key.replace("_", "-"))
+        if value is True:
+            build.append(f"--{name}")
+            continue
         build += [f"--{name} {shlex.quote(str(item))}" for item in (value if isinstance(value, list) else [value])]
     source, base = shlex.quote(str(trained_on)), run["base"]
     learn = f"adapt {shlex.quote(base['path'])} {source}" if base else f"train {source}"

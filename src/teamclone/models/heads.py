@@ -26,7 +26,7 @@ DASH_DIRECTIONS = 24
 TACKLE_DIRECTIONS = 40
 """Classes of tackle direction, 9 degrees apart."""
 AIM_SCALE_DEG = 4.0
-"""How near an aim has to be to the direction of a turn to be taught by it."""
+"""Scale of the bell by which a turn teaches the aims that are near its direction."""
 
 
 class Prediction(NamedTuple):
@@ -292,9 +292,10 @@ class MixtureHead(nn.Module):
     ) -> Loss:
         """Negative log-likelihood of command and parameters together; ``parameter_loss`` does not apply.
 
-        Each answer on a kick counts by itself, so that it learns as if alone.
+        In training each answer on a kick counts by itself, so that it learns as if alone.
         """
-        kicks = [_kick_likelihood(kick, output, target) for kick in output.kick]
+        answers = output.kick if self.training else (_mean_kick(output.kick),)
+        kicks = [_kick_likelihood(kick, output, target) for kick in answers]
         aims = mixture.log_likelihood(
             output.aim.logits,
             mixture.angle_terms(output.aim, target.parameters[:, 0], factor=output.turn_factor),

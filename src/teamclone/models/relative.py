@@ -52,7 +52,7 @@ GEOMETRY = (
 x, y: the actor. coast_x, coast_y: where he comes to rest without a dash. cos, sin: of his body direction.
 forward, aside: his velocity along and across the body. turn_factor: turn moment for one degree. decay: of his velocity.
 dash_gain: speed that one unit of dash power gives. income: stamina that one cycle gives back.
-line_x: the offside line or the ball, whichever is further. near_m: see NEAR_SHARE.
+line_x: the offside line, or where a team mate meets the ball if that is further. near_m: see NEAR_SHARE.
 ball_x, ball_y, ball_vx, ball_vy: the ball. kick_gain: speed that one unit of kick power gives it.
 turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from where he rolls out to where he meets it.
 mate_0_x, ...: the team mates, the nearest first; where one is missing, the actor.

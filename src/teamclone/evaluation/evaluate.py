@@ -23,7 +23,7 @@ from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
 from teamclone.files import write_atomic
 from teamclone.models.heads import PointHead
-from teamclone.models.network import model_id
+from teamclone.models.network import model_id, parameter_count
 from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 
@@ -204,7 +204,7 @@ def evaluate(
             "path": str(run.path),
             "checkpoint": checkpoint,
             "model_id": model_id(model),
-            "weights": sum(weights.numel() for weights in model.parameters()),
+            "weights": parameter_count(model),
             "base": run.environment.get("base"),
         },
         "dataset": {

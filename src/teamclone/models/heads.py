@@ -415,7 +415,7 @@ def log_class(logits: Tensor, degrees: Tensor) -> Tensor:
     """(batch,) log-likelihood of a direction, taken as even within its class."""
     count = logits.shape[1]
     chosen = torch.log_softmax(logits, 1).gather(1, class_of(degrees, count)[:, None]).squeeze(1)
-    return chosen - torch.log(torch.tensor(360.0 / count))
+    return chosen - math.log(360.0 / count)
 
 
 def direction_of(logits: Tensor) -> Tensor:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.models.aims import geometry_of
-from teamclone.models.features import BALL_DECAY
+from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
 from teamclone.models.physics import covered
 from teamclone.models.relative import GEOMETRY, MATES
@@ -26,8 +26,6 @@ TOUCH_M = 3.0
 """The same of a dribble, from where he then is."""
 AHEAD_M = 0.6
 """Where a dribbler likes to have the ball."""
-BALL_SPEED_MAX = 3.0
-"""rcssserver `serverparam.cpp`: ball_speed_max."""
 COUNT = MATES + 1 + FREE + len(DRIBBLES)
 
 

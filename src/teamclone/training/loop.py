@@ -173,7 +173,8 @@ def train(
                 loss.total.backward()  # type: ignore[no-untyped-call]
                 group.add_up_gradients(model)
                 optimiser.step()
-                scores.add(loss, model.head.point(output), target, batch=len(whole))
+                with torch.no_grad():
+                    scores.add(loss, model.head.point(output), target, batch=len(whole))
                 on_progress(Progress(epoch, config.train.epochs, batch, batches, None))
             record: dict[str, Any] = {"epoch": epoch, "samples": len(order)}
             record |= {f"train_{name}": value for name, value in scores.table(group).items()}

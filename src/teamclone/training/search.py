@@ -28,7 +28,7 @@ from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import RunError, TeamcloneError, UsageError
 from teamclone.files import write_atomic
 from teamclone.models.config import ACTIVATIONS
-from teamclone.models.network import Clone
+from teamclone.models.network import Clone, parameter_count
 from teamclone.store.workers import available_cpus, start_worker
 from teamclone.training import loop
 from teamclone.training.config import Config, TrainConfig, config_from, differences, to_table
@@ -672,7 +672,7 @@ def _work(connection: Connection[Any, Any], dataset_path: Path) -> None:
 def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> Ended:
     """Train a trial to its end, or go on with it."""
     config, folder = task
-    weights = sum(weight.numel() for weight in Clone(config.model).parameters())
+    weights = parameter_count(Clone(config.model))
 
     def tell(record: dict[str, Any]) -> None:
         connection.send(Epoch(record, weights))

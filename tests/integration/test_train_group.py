@@ -47,10 +47,15 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_dataset(tmp_path_factory.mktemp("data") / "ds", frames_per_match=50)
 
 
+LAUNCHER = (sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2")
+
+
 def torchrun(dataset: Path, out: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    launcher = ("-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2")
-    command = (sys.executable, *launcher, "-m", "teamclone", "train", str(dataset), "--out", str(out), *options)
-    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+    return started(("-m", "teamclone", "train", str(dataset), "--out", str(out), *options))
+
+
+def started(script: tuple[str, ...]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run((*LAUNCHER, *script), capture_output=True, text=True, timeout=200, check=False)
 
 
 def sets(*more: str) -> list[str]:
@@ -77,7 +82,8 @@ def test_two_processes_train_what_one_trains_and_go_on_with_it(dataset: Path, tm
     assert_same_but_for_rounding(two, one)
 
     longer = "train.epochs=3"
-    assert torchrun(dataset, one.path, "--resume", "--set", longer).returncode == 0
+    done = torchrun(dataset, one.path, "--resume", "--set", longer)
+    assert done.returncode == 0, done.stderr
     train(load_config("small", [*SETTINGS, longer]), open_dataset(dataset), two.path, resume=True)
     assert len(one.history()) == 3
     assert_same_but_for_rounding(two, one)
@@ -99,3 +105,23 @@ def test_a_mistake_ends_all_processes_and_is_told_once(dataset: Path, tmp_path: 
     assert done.stderr.count("teamclone: ") == 1
     assert f"{tmp_path / 'run'}: is not an empty folder; choose another one" in done.stderr
     assert [path.name for path in (tmp_path / "run").iterdir()] == ["thesis.tex"]
+
+
+THREADS_LEFT = """
+from pathlib import Path
+import torch
+from teamclone.training.group import joined
+model = torch.nn.Linear(2, 2)
+with joined(torch.device("cpu")) as group:
+    torch.optim.Adam(model.parameters())
+    group.add_up(torch.ones(2))
+names = [path.read_text() for path in Path("/proc/self/task").glob("*/comm")]
+assert not any("gloo" in name for name in names), names
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="needs Linux's list of threads")
+def test_no_thread_of_the_group_outlives_it(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(THREADS_LEFT)
+    done = started((str(tmp_path / "script.py"),))
+    assert done.returncode == 0, done.stderr

@@ -87,6 +87,10 @@ def joined(device: torch.device) -> Iterator[Group]:
     if not distributed.is_torchelastic_launched() or os.environ["WORLD_SIZE"] == "1":
         yield ALONE
         return
+    # Optimisers import this. Imported while a group exists it keeps the group's threads to the end of the interpreter,
+    # where they abort the process now and then.
+    import torch._dynamo  # noqa: F401
+
     distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     try:
         yield Group(rank=distributed.get_rank(), size=distributed.get_world_size())

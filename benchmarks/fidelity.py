@@ -40,8 +40,9 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation import baselines, metrics
-from teamclone.evaluation.evaluate import KINDS, count_training, describe, predict, truth, write_json
+from teamclone.evaluation.evaluate import KINDS, count_training, describe, predict, truth
 from teamclone.evaluation.outcome import Outcome
+from teamclone.files import write_json
 from teamclone.machine import processor
 from teamclone.models.config import BLOCKS
 from teamclone.models.network import parameter_count

@@ -60,5 +60,9 @@ class ClusterError(TeamcloneError):
     """A cluster that does not answer, has no workers, or went away."""
 
 
+class PlayError(TeamcloneError):
+    """Matches that cannot be played at all: no server, no room, or a folder that holds others."""
+
+
 class RunError(TeamcloneError):
     """A run folder that is missing, incomplete or of another format number."""

@@ -1,9 +1,14 @@
-"""Writing a file in one step."""
+"""Writing a file in one step, and holding a file or folder against other processes."""
 
 from __future__ import annotations
 
+import json
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 def write_atomic(path: Path, data: bytes) -> None:
@@ -20,3 +25,44 @@ def write_atomic(path: Path, data: bytes) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write a document so that a reader sees the old one or the new one; lists stay on one line."""
+    write_atomic(path, f"{_layout(document)}\n".encode())
+
+
+def _layout(value: Any, indent: str = "") -> str:
+    """Objects over many lines, everything else on one: readable, and a diff shows what changed."""
+    if not isinstance(value, dict) or not value:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False, default=str)
+    if set(value) == {"value", "low", "high"}:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    inner = indent + " "
+    lines = [
+        f"{inner}{json.dumps(str(key), ensure_ascii=False)}: {_layout(item, inner)}" for key, item in value.items()
+    ]
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+@contextmanager
+def held(path: Path, *, busy: Exception | None = None) -> Iterator[None]:
+    """Lock a file or folder for this process; the system lets go of it when the process ends, however it ends.
+
+    Raises:
+        BlockingIOError: another process holds it; ``busy`` instead, where it is given.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise busy or error from None
+        yield
+    finally:
+        os.close(handle)

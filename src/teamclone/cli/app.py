@@ -16,7 +16,9 @@ from teamclone.cli import (
     info,
     ingest,
     matches,
+    play,
     report,
+    run,
     search,
     sql,
     train,
@@ -33,6 +35,7 @@ EXTRAS = {
     "jinja2": "report",
     "optuna": "search",
     "distributed": "cluster",
+    "psutil": "play",
     "adbc_driver_postgresql": "postgresql",
     "adbc_driver_manager": "postgresql",
 }
@@ -47,6 +50,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
+    run.run,
+    play.play,
     info.info,
     validate.validate,
     ingest.ingest,

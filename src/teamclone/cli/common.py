@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import tomllib
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from typing import Any, NoReturn, TypeVar
@@ -65,6 +66,20 @@ def progress(what: str) -> Progress:
         console=console,
         disable=not console.is_terminal,
     )
+
+
+def values_of(settings: Iterable[str]) -> dict[str, Any]:
+    """``KEY=VALUE`` texts, the value as TOML writes it; on and off as the server says, anything else is a word."""
+    values: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals:
+            raise UsageError(f"--set: expected KEY=VALUE, got {setting!r}")
+        try:
+            values[key.strip()] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            values[key.strip()] = {"on": True, "off": False}.get(text.strip(), text.strip())
+    return values
 
 
 def choice(kind: type[E], value: str, *, option: str) -> E:

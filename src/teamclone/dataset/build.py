@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from teamclone.dataset import clean, layout
 from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
+from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.errors import DatasetError, UsageError
@@ -173,17 +175,34 @@ def build_dataset(
                 "Matches without a command log have none to give, and before log version 3 nothing tells what was "
                 "executed"
             )
-        options = asdict(config)
-        teams = options.pop("teams")
         meta = {
             "team": config.team,
-            **({"teams": teams} if len(teams) > 1 else {}),
-            "options": {"team": teams if len(teams) > 1 else config.team, **options},
+            **({"teams": config.teams} if len(config.teams) > 1 else {}),
+            "options": _options(config),
             "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
             "cleaning": report,
         }
         writer.finish(player_types=_pad_types(types), meta=meta)
     return report
+
+
+def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
+    """Whether the dataset in a folder is what ``build_dataset`` would make of the store now."""
+    try:
+        meta = open_dataset(folder).meta
+    except DatasetError:
+        return False
+    entries, _ = _entries(store, config)
+    there = [match["match_id"] for match in meta["matches"]]
+    options = json.loads(json.dumps(_options(config)))
+    return meta["options"] == options and there == [entry.match_id for entry in entries]
+
+
+def _options(config: DatasetConfig) -> dict[str, Any]:
+    """A config as the dataset keeps it."""
+    options = asdict(config)
+    teams = options.pop("teams")
+    return {"team": teams if len(teams) > 1 else config.team, **options}
 
 
 def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:

@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 import shutil
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from teamclone.dataset.layout import DETAIL_CHANNELS, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
 from teamclone.errors import DatasetError
+from teamclone.files import held
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.rcss.player_types import FIELDS
 
@@ -191,7 +191,7 @@ def writing_dataset(folder: Path | str, *, replace: bool = False) -> Iterator[Da
         shutil.rmtree(temporary, ignore_errors=True)
         temporary.mkdir()
         try:
-            with _held(temporary):
+            with held(temporary):
                 writer = DatasetWriter(temporary, where=folder)
                 try:
                     yield writer
@@ -247,28 +247,8 @@ def _tidy(folder: Path) -> None:
     """Remove what killed writers of this dataset left."""
     for left in folder.parent.iterdir():
         if left.name.startswith(f".{folder.name}.") and left.suffix == ".part":
-            with suppress(OSError), _held(left):  # unless its writer lives
+            with suppress(OSError), held(left):  # unless its writer lives
                 shutil.rmtree(left, ignore_errors=True)
-
-
-@contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """Lock a folder for this process; the system lets go of it when the process ends, however it ends.
-
-    Raises:
-        BlockingIOError: another process holds it.
-    """
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl
-
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    finally:
-        os.close(handle)
 
 
 @contextmanager

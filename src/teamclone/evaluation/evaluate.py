@@ -21,7 +21,7 @@ from teamclone.evaluation import baselines as rules
 from teamclone.evaluation import bootstrap, metrics
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
-from teamclone.files import write_atomic
+from teamclone.files import write_json
 from teamclone.models.heads import PointHead
 from teamclone.models.network import model_id, parameter_count
 from teamclone.models.state import Target
@@ -506,24 +506,6 @@ def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
     path = evaluation_path(run, evaluation)
     write_json(path, evaluation)
     return path
-
-
-def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write a document so that a reader sees the old one or the new one; lists stay on one line."""
-    write_atomic(path, f"{_layout(document)}\n".encode())
-
-
-def _layout(value: Any, indent: str = "") -> str:
-    """Objects over many lines, everything else on one: readable, and a diff shows what changed."""
-    if not isinstance(value, dict) or not value:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False, default=str)
-    if set(value) == {"value", "low", "high"}:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False)
-    inner = indent + " "
-    lines = [
-        f"{inner}{json.dumps(str(key), ensure_ascii=False)}: {_layout(item, inner)}" for key, item in value.items()
-    ]
-    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
 
 
 def load_evaluation(path: Path | str) -> dict[str, Any]:

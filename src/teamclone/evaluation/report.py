@@ -14,9 +14,9 @@ from markupsafe import Markup
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import RunError
 from teamclone.evaluation import bootstrap, figures, metrics, paper
-from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evaluation, write_json
+from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evaluation
 from teamclone.evaluation.latency import load_bench, measure_latency
-from teamclone.files import write_atomic
+from teamclone.files import write_atomic, write_json
 from teamclone.models.network import model_id
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.training.config import Config, to_toml

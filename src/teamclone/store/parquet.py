@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 
 from teamclone import __version__
 from teamclone.errors import StoreError, UsageError
-from teamclone.files import write_atomic
+from teamclone.files import held, write_atomic
 from teamclone.logs.columns import COUNTERS, counter_name
 from teamclone.logs.match import Columns, Match
 from teamclone.store import convert, schema
@@ -224,9 +224,10 @@ class ParquetStore:
     @contextmanager
     def writing(self) -> Iterator[None]:
         with _writing(self.root):
-            lock = (self.root / ".lock").open("w")
-        with lock:
-            _lock(lock.fileno(), self.root)
+            lock = self.root / ".lock"
+            lock.touch()
+        busy = StoreError(f"{self.root}: another ingest is writing to this store; wait for its end")
+        with held(lock, busy=busy):
             self._tidy()
             try:
                 yield
@@ -342,18 +343,6 @@ def _sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _lock(handle: int, root: Path) -> None:
-    """Hold the file for this process; the system lets go of it when the process ends, however it ends."""
-    if sys.platform == "win32":
-        return
-    import fcntl
-
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise StoreError(f"{root}: another ingest is writing to this store; wait for its end") from None
 
 
 @contextmanager

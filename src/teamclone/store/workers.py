@@ -87,6 +87,7 @@ def run_tasks(
     jobs: int | None = None,
     ahead: int = 1024,
     in_order: bool = False,
+    on_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[tuple[T, R | Died]]:
     """Each task with its result.
 
@@ -97,6 +98,7 @@ def run_tasks(
             process.
         ahead: how many tasks an executor is given before their results are taken, which bounds the memory.
         in_order: give the results in the order of the tasks instead of that in which they end.
+        on_stop: called where the work ends early, before those that run are waited for.
 
     After an error, or if the caller stops early, tasks that already run are waited for and the others are dropped.
 
@@ -104,7 +106,7 @@ def run_tasks(
         ClusterError: the executor dropped a task, because the connection to its workers was lost.
     """
     if executor is not None:
-        yield from _run(function, tasks, executor=executor, ahead=ahead, in_order=in_order)
+        yield from _run(function, tasks, executor=executor, ahead=ahead, in_order=in_order, on_stop=on_stop)
         return
     jobs = min(jobs or available_cpus(), len(tasks))
     if jobs <= 1:
@@ -113,11 +115,17 @@ def run_tasks(
         return
     with Processes(jobs) as processes:
         # For each task that runs another waits, so that no process does while results are taken.
-        yield from _run(function, tasks, executor=processes, ahead=2 * jobs, in_order=in_order)
+        yield from _run(function, tasks, executor=processes, ahead=2 * jobs, in_order=in_order, on_stop=on_stop)
 
 
 def _run(
-    function: Callable[[T], R], tasks: Sequence[T], *, executor: Executor, ahead: int, in_order: bool
+    function: Callable[[T], R],
+    tasks: Sequence[T],
+    *,
+    executor: Executor,
+    ahead: int,
+    in_order: bool,
+    on_stop: Callable[[], None],
 ) -> Iterator[tuple[T, R | Died]]:
     waiting = iter(tasks)
     flying: dict[Future[R], T] = {}
@@ -139,6 +147,8 @@ def _run(
                     ) from None
                 yield task, result
     finally:
+        if flying:
+            on_stop()
         for future in flying:
             future.cancel()
         wait(flying)

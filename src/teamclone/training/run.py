@@ -16,7 +16,6 @@ import json
 import os
 import platform
 import shutil
-import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -31,7 +30,7 @@ import torch
 from teamclone import __version__
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError, UsageError
-from teamclone.files import write_atomic
+from teamclone.files import held, write_atomic
 from teamclone.machine import processor
 from teamclone.models.network import Clone
 from teamclone.rcss.commands import CLONED_KINDS
@@ -246,16 +245,9 @@ def locked(path: Path) -> Iterator[None]:
     Raises:
         RunError: another process holds it.
     """
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl
-
-    with (path / ".lock").open("a") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise RunError(f"{path}: another process is training into it; wait for its end") from None
+    lock = path / ".lock"
+    lock.touch()
+    with held(lock, busy=RunError(f"{path}: another process is training into it; wait for its end")):
         yield
 
 

@@ -1,0 +1,132 @@
+"""`teamclone play`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from teamclone.play.play import PlayReport
+    from teamclone.play.record import Record
+
+SHOWN = 20
+"""Failed matches that are listed."""
+
+
+def play(
+    plan: Annotated[Path | None, typer.Argument(help="Plan (TOML): teams, pairings, options of the server.")] = None,
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for the matches; one that was begun is gone on with.")
+    ] = ...,  # type: ignore[assignment]
+    left: Annotated[
+        str | None, typer.Option(help="Instead of a plan: command that starts a team, or folder with a start script.")
+    ] = None,
+    right: Annotated[str | None, typer.Option(help="The other team.")] = None,
+    matches: Annotated[int, typer.Option("-n", "--matches", min=1, help="Matches of --left and --right.")] = 1,
+    server: Annotated[str | None, typer.Option(help="With --left and --right: the server's program.")] = None,
+    options: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="With --left and --right: an option of the server."),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one for two processors unless given.")
+    ] = None,
+    store: Annotated[str | None, typer.Option("--ingest", help="Add each match to this store as it ends.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Play on the Dask cluster of this scheduler: tcp://host:port.")
+    ] = None,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Try matches again that failed in an earlier call.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
+) -> None:
+    """Play matches on rcssserver, unattended. Given again, the same command plays what is missing."""
+    from teamclone.cli.common import print_json, progress, values_of
+    from teamclone.errors import UsageError
+    from teamclone.play.plan import load_plan, quick_plan
+    from teamclone.play.play import play as run
+    from teamclone.store import create_store
+    from teamclone.store.cluster import executor_of
+
+    if (plan is None) == (left is None and right is None):
+        raise UsageError("give a plan, or --left and --right")
+    if plan is not None:
+        if server or options or matches != 1:
+            raise UsageError("--server, --set and --matches go with --left and --right; a plan says all that itself")
+        asked = load_plan(plan)
+    else:
+        if left is None or right is None:
+            raise UsageError("--left and --right need each other")
+        asked = quick_plan(
+            left, right, matches=matches, server=server or "rcssserver", options=values_of(options or [])
+        )
+    with executor_of(scheduler, jobs=jobs) as executor, progress("play") as bar:
+        task = bar.add_task("", total=len(asked.fixtures))
+        report = run(
+            asked,
+            out,
+            store=None if store is None else create_store(store),
+            executor=executor,
+            jobs=jobs,
+            retry_failed=retry_failed,
+            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
+            on_record=lambda record: bar.console.print(line_of(record), markup=False, highlight=False, soft_wrap=True),
+        )
+    if as_json:
+        print_json(report.to_json())
+    else:
+        print_report(report)
+    if report.failed:
+        raise typer.Exit(1)
+
+
+def line_of(record: Record) -> str:
+    """What became of a match, in a line."""
+    if record.trouble is not None:
+        return f"{record.id}: failed after {record.attempt} attempts: {record.trouble.fault}: {record.trouble.text}"
+    left, right = record.left, record.right
+    return f"{record.id}: {left.name} {left.score} : {right.score} {right.name}, {record.seconds:.0f} s"
+
+
+def print_report(report: PlayReport) -> None:
+    """Pairings with what became of their matches, then the failed ones."""
+    from teamclone.cli.common import print_table
+
+    pairings: dict[tuple[str, str], list[Record]] = {}
+    for record in report.records:
+        pairings.setdefault((record.left.team, record.right.team), []).append(record)
+    rows = []
+    for (left, right), records in pairings.items():
+        whole = [record for record in records if record.complete]
+        sides = [side for record in whole for side in (record.left, record.right)]
+        rows.append(
+            (
+                f"{left} : {right}",
+                len(records),
+                len(whole),
+                len(records) - len(whole),
+                f"{sum(record.left.score for record in whole)} : {sum(record.right.score for record in whole)}",
+                *(_per_match(sum(sum(getattr(side, name) or ()) for side in sides), whole) for name in COUNTS),
+                _per_match(sum(record.seconds for record in whole), whole),
+            )
+        )
+    heads = ("left : right", "matches", "complete", "failed", "goals", *(f"{name}/match" for name in COUNTS), "s/match")
+    print_table(heads, rows, numeric=range(1, 9))
+    failed = report.failed
+    for record in failed[:SHOWN]:
+        print(line_of(record))
+    if len(failed) > SHOWN:
+        print(f"and {len(failed) - SHOWN} more that failed")
+    print(
+        f"matches: {len(report.records) - len(failed)} complete, {len(failed)} failed, {report.played} played now; "
+        f"{report.seconds:.1f} s"
+    )
+
+
+COUNTS = ("holes", "clashes", "missed")
+
+
+def _per_match(total: float, matches: list[Record]) -> str:
+    return f"{total / len(matches):.1f}" if matches else "-"

@@ -1,0 +1,72 @@
+"""`teamclone run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def run(
+    plan: Annotated[Path, typer.Argument(help="Plan (TOML) with what to play, and what to make of it.")],
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for all that is made; one that was begun is gone on with.")
+    ],
+    jobs: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one for two processors unless given.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Play and clean on the Dask cluster of this scheduler: tcp://host:port.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what became of each stage and match as JSON.")] = False,
+) -> None:
+    """Play, store, make the dataset, train, evaluate and report, as one plan says. What is there already is kept."""
+    from teamclone.cli.common import print_json, print_table, progress
+    from teamclone.cli.play import line_of
+    from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
+    from teamclone.store.cluster import executor_of
+    from teamclone.training.loop import Progress
+
+    asked = load_pipeline(plan)
+    with executor_of(scheduler, jobs=jobs) as executor, progress("run") as bar:
+        task = bar.add_task("", total=len(asked.plan.fixtures))
+
+        def show(stage: Stage, done: int, total: int) -> None:
+            bar.update(task, description=stage, completed=done, total=total)
+
+        def show_training(at: Progress) -> None:
+            show(Stage.TRAIN, max(0, at.epoch - 1) * at.batches + at.batch, at.epochs * at.batches)
+
+        report, stages = run_pipeline(
+            asked,
+            out,
+            executor=executor,
+            jobs=jobs,
+            watch=Watch(
+                on_progress=show,
+                on_training=show_training,
+                on_record=lambda record: bar.console.print(
+                    line_of(record), markup=False, highlight=False, soft_wrap=True
+                ),
+            ),
+        )
+    if as_json:
+        rows = [
+            {"stage": result.stage, "done": result.done, "seconds": round(result.seconds, 2), "text": result.text}
+            for result in stages
+        ]
+        print_json({"stages": rows, **report.to_json()})
+    else:
+        print_table(
+            ("stage", "", "s", ""),
+            [
+                (result.stage, "done" if result.done else "kept", f"{result.seconds:.1f}", result.text)
+                for result in stages
+            ],
+            numeric=(2,),
+        )
+        for record in report.failed:
+            print(line_of(record))
+    if report.failed:
+        raise typer.Exit(1)

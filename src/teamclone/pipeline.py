@@ -1,0 +1,229 @@
+"""All of it from one plan: play, store, dataset, training, evaluation, report. What is there and still fits is kept."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from teamclone.dataset.build import DatasetConfig, build_dataset, is_current
+from teamclone.dataset.reader import open_dataset
+from teamclone.errors import PlayError, UsageError
+from teamclone.evaluation.evaluate import evaluate, save_evaluation
+from teamclone.evaluation.report import fresh_evaluation, make_report
+from teamclone.play.plan import Plan, fill, plan_from, read_plan
+from teamclone.play.play import PlayReport, play
+from teamclone.play.record import Record
+from teamclone.store import create_store
+from teamclone.training.config import Config, differences, load_config
+from teamclone.training.loop import Progress, train
+from teamclone.training.run import Run, is_run, open_run
+
+MAX_SHARE = 0.9
+STORE, DATASET, RUN = "store", "dataset", "run"
+"""Folders of a plan's folder, beside those of `play`."""
+
+
+class Stage(StrEnum):
+    """The stages in their order. Each match goes into the store as it ends, so playing and storing are one."""
+
+    PLAY = "play"
+    DATASET = "dataset"
+    TRAIN = "train"
+    EVALUATE = "evaluate"
+    REPORT = "report"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoreSettings:
+    """``location``: a folder or ``postgresql://...``; a folder of its own beside the matches unless given."""
+
+    location: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainSettings:
+    """A preset and what to change in it: ``"train.epochs=10"``."""
+
+    preset: str = "best"
+    set: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluateSettings:
+    """Which weights to evaluate."""
+
+    checkpoint: str = "best-loss"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pipeline:
+    """A plan with all its sections. Without a dataset it ends with the store, without training with the dataset."""
+
+    plan: Plan
+    store: str
+    dataset: DatasetConfig | None
+    train: Config | None
+    checkpoint: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageResult:
+    """What a stage came to: ``done`` is False where all of it was there already."""
+
+    stage: Stage
+    done: bool
+    seconds: float
+    text: str
+
+
+@dataclass(slots=True, kw_only=True)
+class Watch:
+    """Who is told what goes on: a stage's steps, what became of matches, epochs, and what stages came to."""
+
+    on_progress: Callable[[Stage, int, int], None] = lambda stage, done, total: None
+    on_record: Callable[[Record], None] = lambda record: None
+    on_training: Callable[[Progress], None] = lambda progress: None
+    on_stage: Callable[[StageResult], None] = lambda result: None
+    results: list[StageResult] = field(default_factory=list)
+
+    def steps(self, stage: Stage) -> Callable[[int, int], None]:
+        return lambda done, total: self.on_progress(stage, done, total)
+
+    def tell(self, stage: Stage, started: float, text: str, *, done: bool = True) -> None:
+        result = StageResult(stage=stage, done=done, seconds=time.monotonic() - started, text=text)
+        self.results.append(result)
+        self.on_stage(result)
+
+
+def load_pipeline(path: Path) -> Pipeline:
+    """A plan with its sections ``store``, ``dataset``, ``train`` and ``evaluate``.
+
+    Raises:
+        UsageError: naming what is wrong, in one line.
+    """
+    table = read_plan(path)
+    plan = plan_from(table, where=str(path), base=path.absolute().parent)
+    problems: list[str] = []
+    store = fill(StoreSettings, table.get("store", {}), "store", problems)
+    training = fill(TrainSettings, table.get("train", {}), "train", problems)
+    evaluation = fill(EvaluateSettings, table.get("evaluate", {}), "evaluate", problems)
+    config = None
+    if "dataset" in table:
+        config = fill(DatasetConfig, {"teams": [], **table["dataset"]}, "dataset", problems)
+        if not config.teams:
+            problems.append("dataset.teams: name the team to clone")
+        shares = {"test": config.test, "validation": config.validation}
+        problems += [
+            f"dataset.{name}: expected a share from 0 to 0.9, got {share}"
+            for name, share in shares.items()
+            if not 0 <= share <= MAX_SHARE
+        ]
+    for name, needs in (("train", "dataset"), ("evaluate", "train")):
+        if name in table and needs not in table:
+            problems.append(f"[{name}] needs [{needs}]")
+    if problems:
+        raise UsageError(f"{path}: {'; '.join(problems)}")
+    return Pipeline(
+        plan=plan,
+        store=store.location,
+        dataset=config,
+        train=load_config(training.preset, training.set) if "train" in table else None,
+        checkpoint=evaluation.checkpoint,
+    )
+
+
+def run_pipeline(
+    pipeline: Pipeline,
+    out: Path,
+    *,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+    watch: Watch | None = None,
+) -> tuple[PlayReport, list[StageResult]]:
+    """Do what is missing, stage by stage. Stopped or killed, the next call goes on where this one was.
+
+    Args:
+        out: as of `play.play`; store, dataset and run lie beside the matches.
+        executor: where matches are played and cleaned.
+
+    Raises:
+        PlayError: as of `play.play`, or no match at all is complete.
+        TeamcloneError: of the stage that failed; what the stages before made stays.
+    """
+    watch = watch or Watch()
+    out = out.absolute()
+    started = time.monotonic()
+    store = create_store(pipeline.store or str(out / STORE))
+    report = play(
+        pipeline.plan,
+        out,
+        store=store,
+        executor=executor,
+        jobs=jobs,
+        on_progress=watch.steps(Stage.PLAY),
+        on_record=watch.on_record,
+    )
+    complete = len(report.records) - len(report.failed)
+    text = f"{complete} matches in {store.location}, {len(report.failed)} failed"
+    watch.tell(Stage.PLAY, started, text, done=report.played > 0)
+    if not complete:
+        raise PlayError(f"{out}: no match of the plan is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]
+    if pipeline.dataset is None:
+        return report, watch.results
+
+    started, folder = time.monotonic(), out / DATASET
+    current = is_current(folder, pipeline.dataset, store)
+    if not current:
+        build_dataset(
+            pipeline.dataset,
+            store=store,
+            out=folder,
+            executor=executor,
+            jobs=jobs,
+            replace=folder.exists(),
+            on_progress=watch.steps(Stage.DATASET),
+        )
+    dataset = open_dataset(folder)
+    text = f"{dataset.meta['n_samples']:,} samples in {folder}"
+    watch.tell(Stage.DATASET, started, text, done=not current)
+    if pipeline.train is None:
+        return report, watch.results
+
+    started = time.monotonic()
+    run, trained = _train(pipeline.train, folder, out / RUN, watch)
+    watch.tell(Stage.TRAIN, started, f"{len(run.history())} epochs in {run.path}", done=trained)
+
+    started = time.monotonic()
+    evaluation = fresh_evaluation(run)
+    fresh = evaluation is not None and evaluation["run"]["checkpoint"] == pipeline.checkpoint
+    if not fresh:
+        steps = watch.steps(Stage.EVALUATE)
+        save_evaluation(run, evaluate(run, checkpoint=pipeline.checkpoint, on_progress=steps))
+    watch.tell(Stage.EVALUATE, started, f"{run.path}/evaluation.json", done=not fresh)
+
+    started, page = time.monotonic(), run.path / "report.html"
+    there = fresh and page.exists() and page.stat().st_mtime_ns >= (run.path / "evaluation.json").stat().st_mtime_ns
+    if not there:
+        make_report(run, on_progress=lambda _, done, total: watch.on_progress(Stage.REPORT, done, total))
+    watch.tell(Stage.REPORT, started, str(page), done=not there)
+    return report, watch.results
+
+
+def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> tuple[Run, bool]:
+    """The trained run, gone on with or made; and whether there was anything to do."""
+    dataset = open_dataset(dataset_folder)
+    resume = False
+    if is_run(folder):
+        run = open_run(folder)
+        if run.dataset_id != dataset.id or differences(run.config, config):
+            number = 1 + sum(1 for _ in folder.parent.glob(f"{RUN}-before-*"))
+            folder.rename(folder.with_name(f"{RUN}-before-{number}"))
+        elif len(run.history()) >= config.train.epochs:
+            return run, False
+        else:
+            resume = True
+    return train(config, dataset, folder, resume=resume, on_progress=watch.on_training), True

@@ -1,0 +1,1 @@
+"""Playing matches on rcssserver, unattended: from a plan to folders of logs."""

@@ -1,0 +1,73 @@
+"""Holes and clashes: how reliably a team's commands reached the server, counted from the logs of a match.
+
+A hole is a cycle in which a player on the field gave no body command, a clash one in which he gave several, of which
+the server takes the first. In a missed cycle nothing at all came from him, in synch mode not even ``(done)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.logs.align import slot_of
+from teamclone.logs.match import N_PLAYERS, Match
+from teamclone.rcss import state_bits
+from teamclone.rcss.commands import BODY_KINDS, CommandKind
+from teamclone.rcss.playmodes import PlayMode
+
+_FROZEN = state_bits.TACKLE | state_bits.FOUL_CHARGED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Holes:
+    """Counts over the cycles of a match in which a player could act: connected, on the field, not frozen.
+
+    Attributes:
+        holes, clashes, missed: (22,) number of cycles, left 1..11 then right 1..11.
+        longest_silence: (22,) most missed cycles in a row.
+        last_heard: (22,) time of the last frame on which something came from him; -1 where nothing did.
+    """
+
+    holes: NDArray[np.int64]
+    clashes: NDArray[np.int64]
+    missed: NDArray[np.int64]
+    longest_silence: NDArray[np.int64]
+    last_heard: NDArray[np.int64]
+
+
+def count_holes(match: Match) -> Holes:
+    """Holes, clashes and missed cycles of every player."""
+    commands, cycle = match.commands, match.frames["cycle"]
+    n_frames = len(cycle)
+    slot = slot_of(commands["side"], commands["unum"])
+    bound = (commands["frame"] >= 0) & (slot >= 0)
+    place = commands["frame"].astype(np.int64) * N_PLAYERS + slot
+
+    def per_frame(chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        return np.bincount(place[bound & chosen], minlength=n_frames * N_PLAYERS).reshape(n_frames, N_PLAYERS)
+
+    mode = match.frames["playmode"]
+    moves = commands["kind"] == CommandKind.MOVE
+    ignored = moves & (mode[commands["frame"]] == PlayMode.PLAY_ON) if n_frames else moves
+    body = per_frame(np.isin(commands["kind"], list(BODY_KINDS)) & commands["valid"] & ~ignored)
+    heard = per_frame(np.ones(len(slot), np.bool_)) > 0
+    state = match.players["state"]
+    free = ((state & state_bits.STAND) != 0) & ((state & _FROZEN) == 0)
+    free &= ((mode != PlayMode.TIME_OVER) & (mode != PlayMode.BEFORE_KICK_OFF))[:, None]
+    silent = free & ~heard
+    last = np.where(heard, cycle[:, None], -1).max(axis=0, initial=-1)
+    return Holes(
+        holes=(free & (body == 0)).sum(0),
+        clashes=(free & (body > 1)).sum(0),
+        missed=silent.sum(0),
+        longest_silence=np.array([_longest_run(silent[:, player]) for player in range(N_PLAYERS)]),
+        last_heard=last.astype(np.int64),
+    )
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> int:
+    """Most True in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -1,0 +1,421 @@
+"""What is to be played: teams, who plays whom how often, the server's options; from TOML, every mistake at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import hashlib
+import json
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from teamclone.errors import UsageError
+
+N_UNUMS = 11
+COACH = 12
+"""The number by which the league's ``start`` scripts know the coach."""
+
+PLACEHOLDERS = ("host", "port", "coach_port", "olcoach_port", "unum", "team", "folder")
+"""What a team's commands may hold in braces."""
+
+OPTIONS: Mapping[str, bool | int | float | str] = {
+    "server::synch_mode": True,
+    "server::fullstate_l": True,
+    "server::fullstate_r": True,
+    "server::nr_extra_halfs": 0,
+    "server::penalty_shoot_outs": False,
+    "server::game_log_compression": 6,
+    "server::text_log_compression": 6,
+}
+"""The server's options unless the plan says otherwise: those of the paper, and small logs."""
+
+OURS = (
+    *("port", "coach_port", "olcoach_port", "auto_mode", "connect_wait", "coach", "team_l_start", "team_r_start"),
+    *(f"{log}_log_{option}" for log in ("game", "text") for option in ("dir", "fixed", "dated")),
+    *("game_logging", "text_logging"),
+)
+"""Options of the server that a plan may not set: by them a match is run."""
+
+OTHER_SECTIONS = ("store", "dataset", "train", "evaluate")
+"""Sections of a plan that are for `teamclone run`, see `pipeline`."""
+
+_PLACEHOLDER = re.compile(r"\{(\w*)\}")
+_NAME = re.compile(r"[\w.+-]{1,40}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeamSpec:
+    """A team and how its clients are started: by exactly one of ``command``, ``start`` and ``player``.
+
+    No shell reads these commands; ``sh -c '...'`` is one. Each may hold the PLACEHOLDERS.
+
+    Attributes:
+        name: what the plan calls it; the name that its players give the server may be another.
+        folder: where its commands run; the folder of the plan unless given.
+        command: starts the whole team.
+        start: a script as the league has them, called with host, folder and number once for each client: 1 is the
+            goalkeeper, 12 the coach.
+        player, goalie, coach: start one client. Without ``coach`` the team has none.
+        environment: variables to add.
+    """
+
+    name: str
+    folder: str = ""
+    command: str = ""
+    start: str = ""
+    player: str = ""
+    goalie: str = ""
+    coach: str = ""
+    environment: dict[str, str] = field(default_factory=dict)
+
+    def clients(self) -> list[tuple[str, list[str]]]:
+        """Label and words of each process to start: goalkeeper, players, coach; or the one that starts them all."""
+        if self.command:
+            return [("team", shlex.split(self.command))]
+        numbers = [("goalie", 1), *((f"player-{unum}", unum) for unum in range(2, N_UNUMS + 1)), ("coach", COACH)]
+        if self.start:
+            words = [*shlex.split(self.start), "{host}", "{folder}", "{unum}"]
+            return [(label, [word.replace("{unum}", str(unum)) for word in words]) for label, unum in numbers]
+        made = []
+        for label, unum in numbers:
+            text = {1: self.goalie, COACH: self.coach}.get(unum, self.player)
+            if text:
+                made.append((label, [word.replace("{unum}", str(unum)) for word in shlex.split(text)]))
+        return made
+
+    @property
+    def takes_port(self) -> bool:
+        """Whether it can play at another port than the default."""
+        return any("{port}" in word for _, words in self.clients() for word in words)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServerSpec:
+    """The server: a command, found on the PATH or a path, and its options as ``server::half_time``."""
+
+    command: str = "rcssserver"
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def number(self, name: str, default: float) -> float:
+        value = self.options.get(f"server::{name}", default)
+        return float(value) if isinstance(value, int | float) else default
+
+    @property
+    def synch(self) -> bool:
+        return self.options.get("server::synch_mode") is True
+
+    @property
+    def cycles(self) -> int:
+        """Of the regular halves."""
+        return int(10 * self.number("half_time", 300) * self.number("nr_normal_halfs", 2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """How long things may take, in seconds of wall time.
+
+    Attributes:
+        connect_s: from the start of a team to all its players being there.
+        stall_s: without a sign of life of the server.
+        match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10.
+        silent_cycles: of a player on the field who sends nothing, after which he counts as hung.
+    """
+
+    connect_s: float = 60.0
+    stall_s: float = 30.0
+    match_s: float = 0.0
+    silent_cycles: int = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fixture:
+    """One match to play.
+
+    Attributes:
+        id: stable name of its folder; pairings that are added to a plan do not change it.
+        seed: of the heterogeneous player types. The server takes the seed of the game itself from its clock.
+    """
+
+    id: str
+    left: TeamSpec
+    right: TeamSpec
+    server: ServerSpec
+    limits: Limits
+    seed: int
+
+    @property
+    def takes_port(self) -> bool:
+        return self.left.takes_port and self.right.takes_port
+
+    @property
+    def match_s(self) -> float:
+        """The longest it may take."""
+        if self.limits.match_s:
+            return self.limits.match_s
+        return 4 * self.server.cycles / (25 if self.server.synch else 10) + 2 * self.limits.connect_s + 60
+
+    @property
+    def fingerprint(self) -> str:
+        """Says whether two fixtures ask for the same match; limits do not count."""
+        asked = [dataclasses.asdict(part) for part in (self.left, self.right, self.server)]
+        return hashlib.blake2b(json.dumps([asked, self.seed], sort_keys=True).encode(), digest_size=8).hexdigest()
+
+    def to_json(self) -> dict[str, Any]:
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Fixture:
+        parts = {"left": TeamSpec, "right": TeamSpec, "server": ServerSpec, "limits": Limits}
+        return cls(**{name: parts[name](**value) if name in parts else value for name, value in values.items()})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pairing:
+    """``matches`` of every team of ``left`` against every one of ``right``; with ``swap`` as many the other way."""
+
+    left: tuple[str, ...] = ()
+    right: tuple[str, ...] = ()
+    matches: int = 1
+    swap: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaySettings:
+    """How often a match is tried before it counts as failed, and the seed of the player types of the first match."""
+
+    attempts: int = 3
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """All that a plan says about playing."""
+
+    fixtures: tuple[Fixture, ...]
+    attempts: int
+
+
+def load_plan(path: Path) -> Plan:
+    """A plan from a TOML file.
+
+    Raises:
+        UsageError: naming all that is wrong, in one line.
+    """
+    return plan_from(read_plan(path), where=str(path), base=path.absolute().parent)
+
+
+def read_plan(path: Path) -> dict[str, Any]:
+    """The tables of a plan.
+
+    Raises:
+        UsageError: the file is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(f"{path}: is not TOML: {error}") from None
+
+
+def quick_plan(left: str, right: str, *, matches: int, server: str, options: Mapping[str, Any]) -> Plan:
+    """The plan of two teams, each a command that starts it, or a folder with the league's ``start`` script.
+
+    Raises:
+        UsageError: naming all that is wrong, in one line.
+    """
+    teams = {}
+    for side, text in (("left", left), ("right", right)):
+        folder = Path(text).expanduser()
+        script = folder / "start" if folder.is_dir() else folder
+        if script.is_file() and script.name == "start":
+            name = script.absolute().parent.name
+            team: dict[str, Any] = {"start": "./start", "folder": str(script.absolute().parent)}
+        else:
+            name, team = side, {"command": text}
+        teams[name if name not in teams else f"{name}-2"] = team
+    first, second = teams
+    table = {
+        "server": {"command": server, "options": dict(options)},
+        "teams": teams,
+        "pairings": [{"left": first, "right": second, "matches": matches}],
+    }
+    return plan_from(table, where="teamclone play", base=Path.cwd())
+
+
+def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
+    """A plan from its tables; folders are relative to ``base``.
+
+    Raises:
+        UsageError: naming all that is wrong, in one line.
+    """
+    problems: list[str] = []
+    known = ("play", "server", "limits", "teams", "pairings", *OTHER_SECTIONS)
+    problems += [f"no section {name!r}; {choose(name, known)}" for name in table if name not in known]
+    settings = fill(PlaySettings, table.get("play", {}), "play", problems)
+    limits = fill(Limits, table.get("limits", {}), "limits", problems)
+    given = fill(ServerSpec, table.get("server", {}), "server", problems)
+    server = dataclasses.replace(given, options=_options(given.options, problems))
+    teams: dict[str, TeamSpec] = {}
+    for name, values in _entries(table.get("teams", {}), "teams", dict, problems).items():
+        team = fill(TeamSpec, {"name": name, **values}, f"teams.{name}", problems)
+        folder = str((base / Path(team.folder).expanduser()).absolute())
+        teams[name] = dataclasses.replace(team, folder=folder)
+        problems += [f"teams.{name}: {problem}" for problem in _wrong(teams[name])]
+    pairings = table.get("pairings", [])
+    if not isinstance(pairings, list) or not pairings:
+        problems.append("no [[pairings]]: say who plays whom")
+        pairings = []
+    fixtures: list[Fixture] = []
+    counts: dict[tuple[str, str], int] = {}
+    for index, values in enumerate(pairings, 1):
+        key = f"pairings {index}"
+        pairing = fill(Pairing, values, key, problems)
+        sides = [(left, right) for left in pairing.left for right in pairing.right]
+        if not sides:
+            problems.append(f"{key}: needs left and right")
+        if pairing.swap:
+            sides += [(right, left) for left, right in sides]
+        for left, right in sides:
+            strange = [name for name in (left, right) if name not in teams]
+            problems += [f"{key}: no team {name!r}; {choose(name, list(teams))}" for name in strange]
+            if left == right:
+                problems.append(f"{key}: {left} against itself; the server takes each name once")
+            if strange or left == right:
+                continue
+            for _ in range(pairing.matches):
+                count = counts[left, right] = counts.get((left, right), 0) + 1
+                fixture = Fixture(
+                    id=f"{left}-vs-{right}-{count}",
+                    left=teams[left],
+                    right=teams[right],
+                    server=server,
+                    limits=limits,
+                    seed=settings.seed + count - 1,
+                )
+                fixtures.append(fixture)
+        if pairing.matches < 1:
+            problems.append(f"{key}: matches: expected at least 1, got {pairing.matches}")
+    if settings.attempts < 1:
+        problems.append(f"play.attempts: expected at least 1, got {settings.attempts}")
+    if not 0 <= settings.seed < 2**31 - len(fixtures):
+        problems.append(f"play.seed: expected a number from 0 to below 2^31, got {settings.seed}")
+    lengths = {item.name: getattr(limits, item.name) for item in fields(Limits)}
+    problems += [f"limits.{name}: expected at least 0, got {value}" for name, value in lengths.items() if value < 0]
+    if problems:
+        raise UsageError(f"{where}: {'; '.join(dict.fromkeys(problems))}")
+    return Plan(fixtures=tuple(fixtures), attempts=settings.attempts)
+
+
+def option_words(options: Mapping[str, Any]) -> Iterator[str]:
+    """Options as the server's command line takes them."""
+    for name, value in options.items():
+        yield f"{name}={('off', 'on')[value] if isinstance(value, bool) else value}"
+
+
+def filled_in(words: list[str], values: Mapping[str, Any]) -> list[str]:
+    """The words of a command with its placeholders replaced."""
+    return [_PLACEHOLDER.sub(lambda found: str(values[found[1]]), word) for word in words]
+
+
+def fill(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any:
+    """A dataclass from a TOML table; what does not fit is left out and told."""
+    if not isinstance(table, dict):
+        problems.append(f"{key}: expected a table, got {table!r}")
+        table = {}
+    hints = get_type_hints(cls)
+    kept: dict[str, Any] = {}
+    for name, value in table.items():
+        if name not in hints:
+            problems.append(f"no setting {key}.{name}; {choose(name, list(hints))}")
+        elif hints[name] is float and type(value) is int:
+            kept[name] = float(value)
+        elif hints[name] == tuple[str, ...]:
+            several = [value] if isinstance(value, str) else value
+            if isinstance(several, list) and all(isinstance(word, str) for word in several):
+                kept[name] = tuple(several)
+            else:
+                problems.append(f"{key}.{name}: expected a word or a list of words, got {value!r}")
+        elif isinstance(hints[name], type) and issubclass(hints[name], StrEnum):
+            choices = [member.value for member in hints[name]]
+            if value in choices:
+                kept[name] = hints[name](value)
+            else:
+                problems.append(f"{key}.{name}: no {value!r}; choose from {', '.join(choices)}")
+        elif hints[name] == dict[str, str]:
+            kept[name] = _entries(value, f"{key}.{name}", str, problems)
+        elif hints[name] == dict[str, Any]:
+            kept[name] = _entries(value, f"{key}.{name}", object, problems)
+        elif type(value) is hints[name]:
+            kept[name] = value
+        else:
+            kinds = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+            problems.append(f"{key}.{name}: expected {kinds[hints[name]]}, got {value!r}")
+    needed = {item.name for item in fields(cls) if item.default is MISSING and item.default_factory is MISSING}
+    return cls(**dict.fromkeys(needed - kept.keys(), ()), **kept)
+
+
+def choose(wrong: str, choices: list[str] | tuple[str, ...]) -> str:
+    """``did you mean a?``, or all choices where none is near."""
+    near = difflib.get_close_matches(wrong, choices, n=3)
+    return f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(choices)}"
+
+
+def _entries(table: Any, key: str, kind: type, problems: list[str]) -> dict[str, Any]:
+    """A table whose names are free."""
+    if not isinstance(table, dict):
+        problems.append(f"{key}: expected a table, got {table!r}")
+        return {}
+    words = {str: "a text", dict: "a table", object: "a value"}
+    problems += [
+        f"{key}.{name}: expected {words[kind]}, got {value!r}"
+        for name, value in table.items()
+        if not isinstance(value, kind)
+    ]
+    return {name: value for name, value in table.items() if isinstance(value, kind)}
+
+
+def _wrong(team: TeamSpec) -> list[str]:
+    """What is wrong with a team's commands."""
+    problems = []
+    if not _NAME.fullmatch(team.name):
+        problems.append("a name is made of at most 40 letters, digits, '_', '.', '+' and '-'")
+    ways = [name for name in ("command", "start", "player") if getattr(team, name)]
+    if len(ways) != 1:
+        got = " and ".join(ways) or "none"
+        problems.append(f"needs one of command (the whole team), start (the league's script) and player, got {got}")
+    if team.player and not team.goalie:
+        problems.append("player needs goalie, the command of the goalkeeper")
+    if not team.player and (team.goalie or team.coach):
+        problems.append("goalie and coach go with player")
+    for name in ("command", "start", "player", "goalie", "coach"):
+        text = getattr(team, name)
+        try:
+            words = shlex.split(text)
+        except ValueError as error:
+            problems.append(f"{name}: {text!r}: {error}")
+            return problems
+        strange = [found for word in words for found in _PLACEHOLDER.findall(word) if found not in PLACEHOLDERS]
+        problems += [f"{name}: no {{{found}}}; {choose(found, PLACEHOLDERS)}" for found in strange]
+        if "{unum}" in text and name in ("command", "start"):
+            problems.append(f"{name}: {{unum}} is for player, goalie and coach")
+    if not Path(team.folder).is_dir():
+        problems.append(f"{team.folder}: no such folder")
+    return problems
+
+
+def _options(given: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
+    """The server's options under their full names, with those that we set unless told otherwise."""
+    options = dict(OPTIONS)
+    for name, value in given.items():
+        full = name if "::" in name else f"server::{name}"
+        if full.removeprefix("server::") in OURS or full == "player::random_seed":
+            problems.append(f"server.options.{name}: is set by teamclone; leave it out")
+        elif not isinstance(value, bool | int | float | str):
+            problems.append(f"server.options.{name}: expected a number, text, true or false, got {value!r}")
+        options[full] = value
+    return options

@@ -1,0 +1,109 @@
+"""rcssserver: where it is, which version, how it is started."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from teamclone.errors import PlayError
+from teamclone.play.plan import Fixture, ServerSpec, option_words
+
+CONNECT_CYCLES_PER_S = 20
+"""In synch mode a cycle before the kick-off takes at least 50 ms."""
+
+MAX_PROGRAMS = 64
+"""Of a team, whose hashes are kept."""
+
+_VERSION = re.compile(r"rcssserver-([\w.]+)")
+_SEED = re.compile(r"Simulator Random Seed: (-?\d+)")
+_MISSED = "Someone missed a cycle"
+_GAVE_UP = "Waiting too long for clients"
+_NO_SOCKET = "Error initializing sockets"
+
+
+def find_server(server: ServerSpec) -> Path:
+    """The server's program.
+
+    Raises:
+        PlayError: there is none.
+    """
+    found = shutil.which(server.command)
+    if found is None:
+        raise PlayError(
+            f"{server.command}: no such program on the PATH; install rcssserver (https://rcsoccersim.github.io), or "
+            "name it with --server or [server] command"
+        )
+    return Path(found).absolute()
+
+
+def server_words(program: Path, fixture: Fixture, *, port: int, logs: Path) -> list[str]:
+    """The command that starts the server of a match."""
+    wait = int(2 * CONNECT_CYCLES_PER_S * fixture.limits.connect_s) + 400  # we give up before the server does
+    ours: dict[str, Any] = {
+        "server::port": port,
+        "server::coach_port": port + 1,
+        "server::olcoach_port": port + 2,
+        "server::auto_mode": True,
+        "server::connect_wait": wait,
+        "server::game_log_dir": logs,
+        "server::text_log_dir": logs,
+        "player::random_seed": fixture.seed,
+    }
+    return [str(program), *option_words(fixture.server.options | ours)]
+
+
+def server_environment(folder: Path) -> dict[str, str]:
+    """Keeps the settings of the user, in his home or by variable, out of a match."""
+    return {"RCSS_CONF_DIR": str(folder), "HOME": str(folder)}
+
+
+def server_report(output: str) -> dict[str, Any]:
+    """What a server's output says of it: version, seed of the game, cycles that it waited for clients in vain."""
+    version, seed = _VERSION.search(output), _SEED.search(output)
+    return {
+        "version": version and version[1],
+        "random_seed": seed and int(seed[1]),
+        "missed_cycles": output.count(_MISSED),
+    }
+
+
+def gave_up(output: str) -> bool:
+    """Whether the server stopped because clients did not answer."""
+    return _GAVE_UP in output
+
+
+def met_taken_port(output: str) -> bool:
+    return _NO_SOCKET in output
+
+
+def last_words(output: str) -> str:
+    """The last line that speaks of an error, else the last that says something."""
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    errors = [line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)]
+    return (errors or lines or ["it said nothing"])[-1][:200]
+
+
+def hashes(paths: Iterable[Path]) -> dict[str, str]:
+    """SHA-256 of files that can be read, by their path."""
+    found = {}
+    for path in sorted(set(paths)):
+        if path.is_file() and os.access(path, os.R_OK):
+            with path.open("rb") as file:
+                found[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found
+
+
+def programs_of(folder: Path, commands: Iterable[list[str]]) -> list[Path]:
+    """The files that say which version of a team played: those its commands name, and the programs in its folder."""
+    found = []
+    for program, *others in commands:
+        named = folder / program if "/" in program else Path(shutil.which(program) or program)
+        found += [named, *(folder / word for word in others if "/" in word)]
+    nearby = (path for depth in ("*", "*/*") for path in folder.glob(depth))
+    found += [path for path in nearby if os.access(path, os.X_OK)]
+    return [path for path in dict.fromkeys(found) if path.is_file()][:MAX_PROGRAMS]

@@ -1,0 +1,465 @@
+"""`teamclone play` and `teamclone run` with servers and teams as processes: a stand-in, and the real server.
+
+The stand-in (tests/standin) speaks the protocol and writes the logs, its teams cannot play but crash and hang on
+demand. They play on the real rcssserver, too: where one is on the PATH, tests with the marker ``rcssserver`` run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from command import TEAMCLONE, teamclone
+from disk import small_disk
+from teamclone.logs import read_match
+from teamclone.play.processes import MARK
+from teamclone.play.record import NAME
+from teamclone.store import open_store
+
+STANDIN = Path(__file__).resolve().parents[1] / "standin"
+REAL = shutil.which("rcssserver")
+ANSWER_MS = "200"
+"""How long the stand-in waits for a client; the real one takes 1250 ms, twenty times over."""
+
+TEAM = f"{STANDIN}/team --host {{host}} --port {{port}} --name {{team}}"
+SERVERS = [
+    pytest.param(str(STANDIN / "rcssserver"), id="standin"),
+    pytest.param(
+        REAL,
+        id="real",
+        marks=[
+            pytest.mark.rcssserver,
+            pytest.mark.skipif(REAL is None, reason="there is no rcssserver on the PATH"),
+        ],
+    ),
+]
+both_servers = pytest.mark.parametrize("server", SERVERS)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Whatever happens in a test, no process of its matches outlives it."""
+    monkeypatch.setenv("STANDIN_WAIT_MS", ANSWER_MS)
+    yield
+    assert strays(tmp_path) == []
+
+
+def strays(folder: Path) -> list[str]:
+    """Processes of matches that are played under a folder."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            if process.environ().get(MARK, "").startswith(str(folder)):
+                found.append(" ".join(process.cmdline()))
+        except (psutil.Error, OSError):
+            continue
+    return found
+
+
+def write_plan(
+    folder: Path,
+    pairings: list[tuple[str, str]],
+    *,
+    server: str = str(STANDIN / "rcssserver"),
+    teams: dict[str, str] | None = None,
+    matches: int = 1,
+    half_time: int = 2,
+    attempts: int = 1,
+    limits: str = "connect_s = 20",
+    more: str = "",
+) -> Path:
+    """A plan of short matches; ``teams`` maps names to commands or to whole tables, others are sound."""
+    names = dict.fromkeys(name for pairing in pairings for name in pairing)
+    tables = dict.fromkeys(names, f"command = '''{TEAM}'''")
+    for name, text in (teams or {}).items():
+        tables[name] = text if text.lstrip().startswith(("start", "player")) else f"command = '''{text}'''"
+    path = folder / "plan.toml"
+    path.write_text(
+        f"[server]\ncommand = '{server}'\n"
+        f"options = {{ half_time = {half_time}, kick_off_wait = 5, game_over_wait = 5 }}\n"
+        f"[play]\nattempts = {attempts}\n[limits]\n{limits}\n"
+        + "".join(f"[teams.{name}]\n{text}\n" for name, text in tables.items())
+        + "".join(
+            f"[[pairings]]\nleft = '{left}'\nright = '{right}'\nmatches = {matches}\n" for left, right in pairings
+        )
+        + more
+    )
+    return path
+
+
+def play(plan: Path, out: Path, *options: object, code: int = 0) -> dict[str, Any]:
+    done = teamclone("play", plan, "--out", out, "--json", *options, code=code)
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+def one(plan: Path, out: Path, *options: object) -> dict[str, Any]:
+    """The trouble of a match that fails."""
+    answer = play(plan, out, *options, code=1)
+    [record] = answer["records"]
+    trouble: dict[str, Any] = record["trouble"]
+    return trouble
+
+
+@both_servers
+def test_a_match_is_whole_with_its_logs_and_all_that_is_known_of_it(tmp_path: Path, server: str) -> None:
+    out = tmp_path / "out"
+    plan = write_plan(
+        tmp_path, [("Red", "Blue")], server=server, teams={"Red": f"{TEAM} --olcoach-port {{olcoach_port}}"}
+    )
+    answer = play(plan, out, "--ingest", tmp_path / "store")
+    assert (answer["matches"], answer["complete"], answer["failed"], answer["played"]) == (1, 1, 0, 1)
+    home = out / "matches" / "Red-vs-Blue-1"
+    record = json.loads((home / NAME).read_text())
+    assert record == answer["records"][0]
+    assert record["outcome"] == "complete"
+    assert (record["left"]["name"], record["right"]["name"]) == ("Red", "Blue")
+    assert record["cycles"] == 40
+    assert record["server"]["version"] == "19.0.0"
+    assert record["server"]["random_seed"] > 0
+    assert record["server"]["options"]["server::synch_mode"] is True
+    assert record["server"]["files"].keys() == {server}
+    assert len(record["left"]["files"][str(STANDIN / "team")]) == 64
+    assert f"server::port={record['ports'][0]}" in record["commands"]["server"]
+    for side in ("left", "right"):
+        assert record[side]["holes"] == [0] * 11
+        assert record[side]["clashes"] == [0] * 11
+        assert record[side]["missed"] == [0] * 11
+    match = read_match(home / record["logs"][0])
+    assert match.rcl_path == home / record["logs"][1]
+    assert match.game.complete
+    assert match.problems == ()
+    assert match.game.server_params["fullstate_l"] == 1
+    assert open_store(str(tmp_path / "store")).match_ids() == [match.match_id]
+    assert (home / "output" / "server.txt").read_text().startswith("rcssserver-19.0.0")
+    assert {path.name for path in home.iterdir()} == {NAME, "output", *record["logs"]}
+    assert {path.name for path in out.iterdir()} == {"matches", "failed", ".lock"}
+
+    again = play(plan, out)
+    assert again["played"] == 0
+    assert again["records"] == answer["records"]
+
+
+def test_holes_and_clashes_are_counted_for_each_player(tmp_path: Path) -> None:
+    teams = {"Red": f"{TEAM} --hole-every 4", "Blue": f"{TEAM} --clash-every 5"}
+    [record] = play(write_plan(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out")["records"]
+    assert all(8 <= count <= 10 for count in record["left"]["holes"])
+    assert record["left"]["clashes"] == [0] * 11
+    assert all(6 <= count <= 8 for count in record["right"]["clashes"])
+    assert record["right"]["holes"] == [0] * 11
+
+
+@both_servers
+@pytest.mark.parametrize(
+    ("options", "unums"), [("--crash-at 12", tuple(range(1, 12))), ("--crash-at 12 --crash-unum 7", (7,))]
+)
+def test_a_team_that_crashes_is_told_with_its_players(
+    tmp_path: Path, server: str, options: str, unums: tuple[int, ...]
+) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue")], server=server, half_time=30, teams={"Blue": f"{TEAM} {options}"})
+    trouble = one(plan, tmp_path / "out")
+    assert (trouble["fault"], trouble["side"]) == ("crashed", "right")
+    assert tuple(trouble["unums"]) == unums
+    assert trouble["cycle"] >= 12
+    [attempt] = (tmp_path / "out" / "failed" / "Red-vs-Blue-1").iterdir()
+    assert {path.suffix for path in attempt.glob("*rc*")} == {".failed"}
+    assert not list((tmp_path / "out" / "matches").iterdir())
+
+
+@both_servers
+def test_a_team_that_never_comes_is_given_up(tmp_path: Path, server: str) -> None:
+    plan = write_plan(
+        tmp_path, [("Late", "Red")], server=server, limits="connect_s = 1", teams={"Late": f"{TEAM} --never-connect"}
+    )
+    trouble = one(plan, tmp_path / "out")
+    assert (trouble["fault"], trouble["side"], trouble["cycle"]) == ("never connected", "left", 0)
+    assert "Late: 0 of 11 players connected within 1 s" in trouble["text"]
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("./no-such-program", "No such file or directory"),
+        ("sh -c 'echo wrong library; exit 127'", "team ended with code 127 before the kick-off: wrong library"),
+        ("sh -c 'kill -SEGV $$'", "team was ended by SIGSEGV before the kick-off"),
+    ],
+)
+def test_a_team_that_does_not_start_is_told_with_its_last_words(tmp_path: Path, command: str, words: str) -> None:
+    trouble = one(write_plan(tmp_path, [("Red", "Bad")], teams={"Bad": command.replace("'", '"')}), tmp_path / "out")
+    assert (trouble["fault"], trouble["side"]) == ("team did not start", "right")
+    assert words in trouble["text"]
+
+
+@both_servers
+def test_a_client_that_hangs_is_found(tmp_path: Path, server: str) -> None:
+    """In synchronous mode the server gives up on it, and the command log says who it was."""
+    plan = write_plan(tmp_path, [("Red", "Blue")], server=server, half_time=20, teams={"Red": f"{TEAM} --hang-at 30"})
+    trouble = one(plan, tmp_path / "out")
+    assert (trouble["fault"], trouble["side"]) == ("hung", "left")
+    assert trouble["unums"] == list(range(1, 12))
+
+
+@pytest.mark.parametrize(
+    ("variable", "fault", "words"),
+    [
+        ("STANDIN_DIE_AT", "server died", "the server was ended by SIGSEGV before the end"),
+        ("STANDIN_EXIT_EARLY_AT", "server died", "the server ended with code 0 before the end"),
+        ("STANDIN_HANG_AT", "server stalled", "nothing from the server for 2 s"),
+    ],
+)
+def test_a_server_that_ends_or_stalls_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, fault: str, words: str
+) -> None:
+    monkeypatch.setenv(variable, "15")
+    trouble = one(write_plan(tmp_path, [("Red", "Blue")], limits="stall_s = 2"), tmp_path / "out")
+    assert (trouble["fault"], trouble["side"]) == (fault, None)
+    assert words in trouble["text"]
+
+
+def test_a_match_over_its_time_is_ended(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue")], half_time=300, limits="match_s = 4")
+    assert one(plan, tmp_path / "out")["fault"] == "took too long"
+
+
+@both_servers
+def test_a_wrong_option_is_told_in_the_server_s_words(tmp_path: Path, server: str) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue")], server=server)
+    plan.write_text(plan.read_text().replace("kick_off_wait", "kick_of_wait"))
+    trouble = one(plan, tmp_path / "out")
+    assert trouble["fault"] == "server did not start"
+    assert "kick_of_wait" in trouble["text"]
+
+
+def test_without_a_server_nothing_is_begun(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue")], server="no-such-server")
+    done = teamclone("play", plan, "--out", tmp_path / "out", code=1)
+    assert "no-such-server: no such program on the PATH; install rcssserver" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@both_servers
+def test_league_scripts_share_the_default_port_one_match_after_the_other(tmp_path: Path, server: str) -> None:
+    script = f"start = '{STANDIN}/start'\nenvironment = {{ TEAM_NAME = '{{team}}' }}"
+    plan = write_plan(tmp_path, [("Red", "Blue")], server=server, teams={"Red": script}, matches=2)
+    records = play(plan, tmp_path / "out", "-j", 2)["records"]
+    assert [record["ports"] for record in records] == [[6000, 6001, 6002]] * 2
+    assert all(record["outcome"] == "complete" for record in records)
+    assert all(len(record["commands"]) == 1 + 12 + 1 for record in records)
+
+
+def test_a_default_port_that_a_stranger_has_is_told(tmp_path: Path) -> None:
+    script = f"start = '{STANDIN}/start'"
+    plan = write_plan(tmp_path, [("Red", "Blue")], teams={"Red": script})
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        try:
+            stranger.bind(("", 6001))
+        except OSError:
+            pytest.skip("port 6001 is in use on this machine")
+        trouble = one(plan, tmp_path / "out")
+    assert trouble["fault"] == "no port"
+    assert "teams without {port} in their commands need 6000" in trouble["text"]
+
+
+@pytest.mark.parametrize("habit", ["--refuse-to-die", "--fork", "--leave-children", "--refuse-to-die --fork"])
+@pytest.mark.parametrize("crash", [False, True])
+def test_nothing_stays_of_teams_with_bad_habits(tmp_path: Path, habit: str, crash: bool) -> None:
+    teams = {"Red": f"{TEAM} {habit}", "Blue": f"{TEAM} {'--crash-at 10' if crash else ''}"}
+    answer = play(write_plan(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out", code=int(crash))
+    assert answer["failed"] == int(crash)
+    assert strays(tmp_path) == []
+
+
+def test_a_match_is_tried_again_and_failures_are_remembered(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    plan = write_plan(tmp_path, [("Red", "Blue")], attempts=3, teams={"Blue": f"{TEAM} --crash-at 5"})
+    [record] = play(plan, out, code=1)["records"]
+    assert record["attempt"] == 3
+    assert sorted(path.name for path in (out / "failed" / "Red-vs-Blue-1").iterdir()) == ["1", "2", "3"]
+    assert play(plan, out, code=1)["played"] == 0
+    assert play(plan, out, "--retry-failed", code=1)["played"] == 1
+
+
+def test_a_match_that_comes_off_at_the_second_attempt_counts(tmp_path: Path) -> None:
+    once = f"sh -c 'if mkdir {tmp_path}/once 2>/dev/null; then exit 1; fi; exec {TEAM}'".replace("'", '"')
+    [record] = play(write_plan(tmp_path, [("Red", "Blue")], attempts=2, teams={"Red": once}), tmp_path / "out")[
+        "records"
+    ]
+    assert (record["outcome"], record["attempt"]) == ("complete", 2)
+    assert (tmp_path / "out" / "failed" / "Red-vs-Blue-1" / "1" / NAME).is_file()
+
+
+def test_a_changed_plan_is_not_mixed_with_what_was_played(tmp_path: Path) -> None:
+    play(write_plan(tmp_path, [("Red", "Blue")]), tmp_path / "out")
+    play(write_plan(tmp_path, [("Red", "Blue")], matches=2), tmp_path / "out")  # more matches are welcome
+    done = teamclone("play", write_plan(tmp_path, [("Red", "Blue")], half_time=3), "--out", tmp_path / "out", code=2)
+    assert "Red-vs-Blue-1: was played in" in done.stderr
+
+
+def test_the_quick_case_needs_no_plan(tmp_path: Path) -> None:
+    red, blue = (TEAM.replace("{team}", name) for name in ("Red", "Blue"))
+    server = ("--server", STANDIN / "rcssserver", "--set", "half_time=2", "--set", "kick_off_wait=5")
+    done = teamclone("play", "--left", red, "--right", blue, "-n", 2, *server, "--out", tmp_path / "out")
+    assert "matches: 2 complete, 0 failed, 2 played now" in done.stdout
+    assert "left : right" in done.stdout
+    for wrong in (("--left", red), (tmp_path / "plan.toml", "--left", red), ()):
+        teamclone("play", *wrong, "--out", tmp_path / "out", code=2)
+
+
+def test_another_process_is_not_disturbed(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue")], half_time=300)
+    first = started(plan, tmp_path / "out")
+    wait_for_match(tmp_path / "out")
+    done = teamclone("play", plan, "--out", tmp_path / "out", code=1)
+    assert "another process plays into it" in done.stderr
+    first.send_signal(signal.SIGINT)
+    assert first.wait(20) == 130
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_whoever_ends_it_ends_its_processes(tmp_path: Path, number: signal.Signals) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300, teams={"Red": f"{TEAM} --fork"})
+    process = started(plan, tmp_path / "out", "-j", "2")
+    wait_for_match(tmp_path / "out", number=2)
+    process.send_signal(number)
+    assert process.wait(20) == (130 if number == signal.SIGINT else -number)
+    deadline = time.monotonic() + 15
+    while strays(tmp_path) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert strays(tmp_path) == []
+    assert not list((tmp_path / "out" / "matches").iterdir())
+    assert not list((tmp_path / "out" / "failed").iterdir())
+
+
+def test_a_killed_keeper_costs_an_attempt(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    plan = write_plan(tmp_path, [("Red", "Blue")], attempts=2, half_time=60, teams={"Red": f"{TEAM} --fork"})
+    process = started(plan, out)
+    wait_for_match(out)
+    [keeper] = [child for child in psutil.Process(process.pid).children() if "teamclone.play.keeper" in child.cmdline()]
+    keeper.kill()
+    assert process.wait(100) == 0
+    record = json.loads((out / "matches" / "Red-vs-Blue-1" / NAME).read_text())
+    assert (record["outcome"], record["attempt"]) == ("complete", 2)
+    failed = json.loads((out / "failed" / "Red-vs-Blue-1" / "1" / NAME).read_text())
+    assert failed["trouble"]["fault"] == "keeper died"
+
+
+def test_a_full_disk_stops_all_and_nothing_is_lost(tmp_path: Path) -> None:
+    with small_disk(tmp_path / "disk", kilobytes=34_000) as disk:
+        out = disk / "out"
+        assert play(write_plan(tmp_path, [("Red", "Blue")]), out)["complete"] == 1
+        plan = write_plan(tmp_path, [("Red", "Blue")], matches=2)
+        (disk / "ballast").write_bytes(bytes(8_000_000))
+        done = teamclone("play", plan, "--out", out, code=1)
+        assert "make room and give the same command again" in done.stderr
+        (disk / "ballast").unlink()
+        answer = play(plan, out)
+        assert (answer["complete"], answer["played"]) == (2, 1)
+
+
+TROUBLED = {"Crash": f"{TEAM} --crash-at 10", "Never": f"{TEAM} --never-connect"}
+SIX = [("Red", "Blue"), ("Blue", "Red"), ("Red", "Green"), ("Crash", "Red"), ("Blue", "Never"), ("Green", "Crash")]
+
+
+def check_six(out: Path, store: Path, answer: dict[str, Any]) -> None:
+    """Six pairings twice: six matches come off, four have a team that crashes, two one that never comes."""
+    assert len(answer["records"]) == 12
+    faults = [
+        record["trouble"] and (record["trouble"]["fault"], record["trouble"]["side"]) for record in answer["records"]
+    ]
+    expected = [None] * 6 + [("crashed", "left")] * 2 + [("never connected", "right")] * 2 + [("crashed", "right")] * 2
+    assert faults == expected
+    whole = sorted(path.name for path in (out / "matches").iterdir())
+    assert whole == sorted(record["id"] for record in answer["records"][:6])
+    ids = {read_match(next((out / "matches" / name).glob("*.rcg*"))).match_id for name in whole}
+    assert set(open_store(str(store)).match_ids()) == ids
+    assert not (out / ".playing").exists()
+
+
+@both_servers
+@pytest.mark.slow
+def test_six_pairings_with_trouble_end_in_twelve_outcomes(tmp_path: Path, server: str) -> None:
+    plan = write_plan(tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2)
+    answer = play(plan, tmp_path / "out", "-j", 2, "--ingest", tmp_path / "store", code=1)
+    check_six(tmp_path / "out", tmp_path / "store", answer)
+
+
+@both_servers
+@pytest.mark.slow
+def test_the_same_after_five_kills_at_random(tmp_path: Path, server: str) -> None:
+    plan = write_plan(tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2)
+    out, store, chance = tmp_path / "out", tmp_path / "store", random.Random(5)
+    for _ in range(5):
+        process = started(plan, out, "-j", "2", "--ingest", str(store))
+        time.sleep(chance.uniform(1, 8))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    answer = play(plan, out, "-j", 2, "--ingest", store, code=1)
+    check_six(out, store, answer)
+
+
+@both_servers
+@pytest.mark.slow
+def test_a_whole_plan_runs_and_what_is_there_is_kept(tmp_path: Path, server: str) -> None:
+    more = (
+        "[dataset]\nteams = 'Red'\ntest = 0.2\nvalidation = 0.2\nunseen = 'Green'\n"
+        "[train]\npreset = 'small'\nset = ['train.epochs=1', 'data.batches_per_epoch=2', 'data.batch_size=64']\n"
+    )
+    pairings = [("Red", "Blue"), ("Green", "Red")]
+    plan = write_plan(tmp_path, pairings, server=server, matches=5, more=more)
+    out = tmp_path / "out"
+
+    def stages() -> dict[str, bool]:
+        answer = json.loads(teamclone("run", plan, "--out", out, "-j", 2, "--json").stdout)
+        return {stage["stage"]: stage["done"] for stage in answer["stages"]}
+
+    assert stages() == dict.fromkeys(("play", "dataset", "train", "evaluate", "report"), True)
+    assert "<html" in (out / "run" / "report.html").read_text()
+    assert stages() == dict.fromkeys(("play", "dataset", "train", "evaluate", "report"), False)
+    text = plan.read_text()
+    plan.write_text(text.replace("train.epochs=1", "train.epochs=2"))
+    assert stages() == {"play": False, "dataset": False, "train": True, "evaluate": True, "report": True}
+    assert (out / "run-before-1").is_dir()
+    plan.write_text(plan.read_text().replace("unseen = 'Green'\n", ""))
+    assert stages() == {"play": False, "dataset": True, "train": True, "evaluate": True, "report": True}
+
+
+def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_path: Path) -> None:
+    for more, words in (
+        ("[dataset]\ntest = 2.0\nsplit = 'row'\n", "dataset.split: no 'row'; choose from match, rows"),
+        ("[dataset]\ntest = 2.0\n", "dataset.teams: name the team to clone"),
+        ("[train]\npreset = 'small'\n", "[train] needs [dataset]"),
+        ("[dataset]\nteams = 'Red'\n[train]\nset = ['train.epoch=1']\n", "did you mean train.epochs"),
+        ("[store]\nplace = 'x'\n", "no setting store.place"),
+    ):
+        plan = write_plan(tmp_path, [("Red", "Blue")], more=more)
+        done = teamclone("run", plan, "--out", tmp_path / "out", code=2)
+        assert words in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def started(plan: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
+    command = [str(TEAMCLONE), "play", str(plan), "--out", str(out), *options]
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen(command, stdout=quiet, stderr=quiet, start_new_session=True)
+
+
+def wait_for_match(out: Path, *, number: int = 1) -> None:
+    """Until so many matches are being played, with all that belongs to them."""
+    deadline = time.monotonic() + 60
+    while len(list(out.glob(".playing/*/output/right-team.txt"))) < number:
+        assert time.monotonic() < deadline, "the matches do not begin"
+        time.sleep(0.05)
+    time.sleep(1)

@@ -1,0 +1,148 @@
+"""What is told of a match while it is played and afterwards: monitor packets, ports, holes, the record, output."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from teamclone.errors import PlayError
+from teamclone.logs import read_match
+from teamclone.play.holes import count_holes
+from teamclone.play.monitor import scene_of
+from teamclone.play.plan import ServerSpec
+from teamclone.play.ports import DEFAULT_PORT, held_ports, is_free
+from teamclone.play.record import Fault, Record, Side, Trouble, load_record, save_record
+from teamclone.play.server import find_server, gave_up, last_words, met_taken_port, programs_of, server_report
+from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.playmodes import PlayMode
+
+PLAYER = b"((%s %d) 0 %s -50 0 0 0 0 0 (v h 120) (s 8000 1 1 130600) (c 0 0 0 0 1 0 0 0 0 0 0))"
+
+
+def packet(
+    *, states: dict[tuple[str, int], str], cycle: int = 7, pm: int = 3, left: str = "Red", right: str = "null"
+) -> bytes:
+    players = b" ".join(
+        PLAYER % (side.encode(), unum, states.get((side, unum), "0").encode()) for side in "lr" for unum in range(1, 12)
+    )
+    head = f"(show {cycle} (pm {pm}) (tm {left} {right} 1 2) ((b) 0 0 0 0) ".encode()
+    return head + players + b")\0"
+
+
+def test_a_packet_says_who_is_there() -> None:
+    scene = scene_of(packet(states={("l", 1): "0x9", ("l", 11): "0x1", ("r", 3): "0x100"}))
+    assert scene is not None
+    assert (scene.cycle, scene.playmode, scene.names, scene.scores) == (7, PlayMode.PLAY_ON, ("Red", None), (1, 2))
+    assert scene.present == ({1, 11}, {3})  # sent off is still there
+    assert scene.begun
+    assert not scene.over
+
+
+def test_other_packets_are_none_of_ours() -> None:
+    assert scene_of(b"(server_param (audio_cut_dist 50))") is None
+    assert scene_of(b"") is None
+
+
+def test_ports_that_are_in_use_are_passed_over() -> None:
+    with held_ports(any_block=True) as first:
+        assert first is not None
+        assert first > DEFAULT_PORT
+        with held_ports(any_block=True) as second:
+            assert second is not None
+            assert second > first
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", first + 2))
+        assert not is_free(first + 2)
+        with held_ports(any_block=True) as third:
+            assert third != first
+
+
+def test_holes_clashes_and_missed_cycles_are_those_put_into_a_match(samples_dir: Path) -> None:
+    match = read_match(sorted(samples_dir.glob("*.rcg*"))[0])
+    assert match.log is not None
+    before = count_holes(match)
+    slot, commands = 4, match.commands
+    played = np.flatnonzero(match.frames["playmode"] == PlayMode.PLAY_ON)
+    frames = next(run for run in np.lib.stride_tricks.sliding_window_view(played, 40) if run[-1] - run[0] == 39)
+    mine = (commands["side"] == 1) & (commands["unum"] == slot + 1)
+    quiet, twice, silent = frames[:10], frames[10:15], frames[20:40]
+    body = np.isin(commands["kind"], [CommandKind.DASH, CommandKind.TURN, CommandKind.KICK, CommandKind.TACKLE])
+    dropped = mine & ((body & np.isin(commands["frame"], quiet)) | np.isin(commands["frame"], silent))
+    doubled = np.flatnonzero(mine & body & np.isin(commands["frame"], twice))
+    kept = np.sort(np.concatenate([np.flatnonzero(~dropped), doubled]))
+    changed = {name: column[kept] for name, column in match.log.commands.items()}
+    after = count_holes(replace(match, log=replace(match.log, commands=changed)))
+    # Every one of these frames had exactly one body command of his.
+    assert len(np.unique(commands["frame"][mine & body & np.isin(commands["frame"], frames)])) == len(frames)
+    assert after.holes[slot] - before.holes[slot] == len(quiet) + len(silent)
+    assert after.clashes[slot] - before.clashes[slot] == len(twice)
+    assert after.missed[slot] - before.missed[slot] == len(silent)
+    assert after.longest_silence[slot] == len(silent)
+    others = np.arange(22) != slot
+    assert np.array_equal(after.holes[others], before.holes[others])
+    assert np.array_equal(after.clashes[others], before.clashes[others])
+
+
+def record(trouble: Trouble | None = None) -> Record:
+    side = Side(
+        team="Red", name="Red", score=2, holes=(1,) * 11, clashes=(0,) * 11, missed=(0,) * 11, exits={"goalie": -9}
+    )
+    return Record(
+        id="Red-vs-Blue-1",
+        fingerprint="ab",
+        attempt=2,
+        left=side,
+        right=Side(team="Blue"),
+        trouble=trouble,
+        logs=("a.rcg", "a.rcl"),
+        ports=(6000, 6001, 6002),
+    )
+
+
+@pytest.mark.parametrize(
+    "trouble", [None, Trouble(fault=Fault.CRASHED, text="gone", side="left", unums=(3, 4), cycle=12)]
+)
+def test_a_record_is_read_back_as_it_was_written(tmp_path: Path, trouble: Trouble | None) -> None:
+    assert load_record(tmp_path) is None
+    save_record(tmp_path, record(trouble))
+    assert load_record(tmp_path) == record(trouble)
+    assert record(trouble).complete == (trouble is None)
+
+
+def test_a_damaged_or_foreign_record_is_told_with_its_path(tmp_path: Path) -> None:
+    (tmp_path / "match.json").write_text("{")
+    with pytest.raises(PlayError, match=r"match\.json: is damaged .* remove its folder"):
+        load_record(tmp_path)
+    (tmp_path / "match.json").write_text('{"format": 99}')
+    with pytest.raises(PlayError, match=r"match\.json: has format 99, expected 1"):
+        load_record(tmp_path)
+
+
+def test_the_server_s_output_tells_version_seed_and_waits() -> None:
+    output = (
+        "rcssserver-16.0.0\n\nSimulator Random Seed: 123\nSomeone missed a cycle at 4\nSomeone missed a cycle at 5\n"
+    )
+    assert server_report(output) == {"version": "16.0.0", "random_seed": 123, "missed_cycles": 2}
+    assert server_report("") == {"version": None, "random_seed": None, "missed_cycles": 0}
+    assert gave_up("Waiting too long for clients! Exiting\n")
+    assert met_taken_port("Error initializing sockets: port=6000. Address already in use\n")
+    assert last_words("one\n two \n\n") == "two"
+    assert last_words("cmd line args: 1: error: no parameter 'x'\n\nUsage: rcssserver\n").endswith("no parameter 'x'")
+
+
+def test_no_server_on_the_path_says_what_to_install() -> None:
+    with pytest.raises(PlayError, match="no-such-server: no such program on the PATH; install rcssserver"):
+        find_server(ServerSpec(command="no-such-server"))
+
+
+def test_the_programs_of_a_team_are_those_it_names_and_those_in_its_folder(tmp_path: Path) -> None:
+    for name in ("bin/player", "player.conf", "conf/formation", "notes"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch(mode=0o755 if "bin" in name else 0o644)
+    found = programs_of(tmp_path, [["sh", "./player.conf", "-x", "conf/formation"], ["./bin/player"]])
+    assert {path.name for path in found} == {"sh", "player.conf", "formation", "player"}
+    assert tmp_path / "notes" not in found

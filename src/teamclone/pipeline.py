@@ -127,9 +127,12 @@ def load_pipeline(path: Path) -> Pipeline:
             problems.append(f"[{name}] needs [{needs}]")
     if problems:
         raise UsageError(f"{path}: {'; '.join(problems)}")
+    location = store.location
+    if location and "://" not in location:
+        location = str(path.absolute().parent / Path(location).expanduser())
     return Pipeline(
         plan=plan,
-        store=store.location,
+        store=location,
         dataset=config,
         train=load_config(training.preset, training.set) if "train" in table else None,
         checkpoint=evaluation.checkpoint,

@@ -18,8 +18,12 @@ from typing import Any
 import pytest
 
 from command import TEAMCLONE, teamclone
+from playing import strays, write_plan
 from teamclone.errors import UsageError
+from teamclone.play.plan import load_plan
+from teamclone.play.play import _play_match, _Task
 from teamclone.store import create_store, ingest, open_store
+from teamclone.store.cluster import executor_of
 
 DASK = TEAMCLONE.with_name("dask")
 QUIET = subprocess.DEVNULL
@@ -204,3 +208,50 @@ def test_a_worker_that_does_not_see_the_logs(fixtures_dir: Path, tmp_path: Path)
         ingest([logs], store, executor=Elsewhere())
     assert store.files() == []
     assert ingest([logs], store).added == 1
+
+
+def test_matches_are_played_on_a_cluster_and_a_killed_worker_costs_none(cluster: Cluster, tmp_path: Path) -> None:
+    out, pairings = tmp_path / "out", [("Red", "Blue"), ("Blue", "Red")]
+    plan = write_plan(tmp_path, pairings, half_time=30, attempts=1)
+    process = start(
+        "play", plan, "--out", out, "--scheduler", cluster.address, "--ingest", tmp_path / "store", "--json"
+    )
+    try:
+        wait_for(lambda: len(list(out.glob(".playing/*/output/right-team.txt"))) == 2, "match on each worker")
+        cluster.workers[0].kill()
+        text, err = process.communicate(timeout=100)
+    finally:
+        process.kill()
+    assert process.returncode == 0, err
+    assert json.loads(text)["complete"] == 2
+    assert len(open_store(tmp_path / "store").match_ids()) == 2
+    assert strays(tmp_path) == []
+
+
+def test_ctrl_c_ends_the_matches_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    plan = write_plan(tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300)
+    process = start("play", plan, "--out", out, "--scheduler", cluster.address)
+    try:
+        wait_for(lambda: len(list(out.glob(".playing/*/output/right-team.txt"))) == 2, "match on each worker")
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130, err
+    wait_for(lambda: strays(tmp_path) == [], "end of the matches", seconds=20)
+    assert list((out / "matches").iterdir()) == []
+
+
+def test_a_folder_that_workers_do_not_see_is_told(cluster: Cluster, tmp_path: Path) -> None:
+    """The workers' view of the folder is taken away by asking for the match without it."""
+    task = _Task(
+        fixture=load_plan(write_plan(tmp_path, [("Red", "Blue")])).fixtures[0],
+        attempts=1,
+        out=tmp_path / "elsewhere",
+        wanted=tmp_path / "elsewhere" / "wanted",
+    )
+    with executor_of(cluster.address) as executor:
+        assert executor is not None
+        with pytest.raises(UsageError, match=r"elsewhere: the worker on .* does not see this folder"):
+            executor.submit(_play_match, task).result(60)

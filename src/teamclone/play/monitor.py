@@ -1,12 +1,15 @@
 """What the server tells monitors: who is there, the play mode, the time. So a match is watched without its logs.
 
-Protocol version 3 of rcssserver (`dispsender.cpp`, `serializermonitor.cpp`), which servers since 13 speak.
+Protocol version 3 of rcssserver (`dispsender.cpp`, `serializermonitor.cpp`), which servers since 12.1 speak. In
+synchronous mode the server pauses for monitors, 20 ms in 32 cycles, so one looks in only now and then when it can.
 """
 
 from __future__ import annotations
 
 import re
 import socket
+import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 from teamclone.rcss.playmodes import PlayMode
@@ -14,6 +17,8 @@ from teamclone.rcss.playmodes import PlayMode
 _HEAD = re.compile(rb"\(show (\d+) \(pm (\d+)\) \(tm (\S+) (\S+) (\d+) (\d+)")
 _PLAYER = re.compile(rb"\(\(([lr]) (\d+)\) -?\d+ (0x[0-9a-f]+|0) ")
 _MAX_BYTES = 16_384
+_ASK_S = 0.3
+"""Between two requests to a server that is not up yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,33 +65,48 @@ def scene_of(packet: bytes) -> Scene | None:
 
 
 class Monitor:
-    """A connection to a server on this machine."""
+    """A connection to a server on this machine.
+
+    Attributes:
+        rest_s: how long to be away once something was seen; 0 stays.
+    """
 
     def __init__(self, port: int) -> None:
+        self.rest_s = 0.0
+        self._there, self._ask_at = False, 0.0
         self._server = ("127.0.0.1", port)
+        self._served_at = self._server  # the server answers each monitor from a port of its own
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         self._socket.setblocking(False)
 
-    def ask(self) -> None:
-        """Ask to be told; while the server is not up yet nobody hears it."""
-        self._socket.sendto(b"(dispinit version 3)\0", self._server)
-
     def latest(self) -> Scene | None:
-        """The newest scene that has come since the last call; None where none has."""
+        """The newest scene that has come since the last call; None where none has. Never waits."""
         packet = None
         while True:
             try:
-                data = self._socket.recv(_MAX_BYTES)
+                data, address = self._socket.recvfrom(_MAX_BYTES)
             except BlockingIOError:
                 break
             except ConnectionError:  # an earlier question met no server
                 continue
             if data.startswith(b"(show "):
-                packet = data
+                packet, self._served_at = data, address
+        now = time.monotonic()
+        self._there = self._there or packet is not None
+        if self._there and self.rest_s:
+            self._send(b"(dispbye)", self._served_at)
+            self._there, self._ask_at = False, now + self.rest_s
+        elif not self._there and now >= self._ask_at:
+            self._send(b"(dispinit version 3)", self._server)
+            self._ask_at = now + _ASK_S
         return None if packet is None else scene_of(packet)
 
-    def leave(self) -> None:
-        """Say goodbye, so that the server sends no more."""
-        self._socket.sendto(b"(dispbye)\0", self._server)
+    def close(self) -> None:
+        """Leave for good."""
+        self._send(b"(dispbye)", self._served_at)
         self._socket.close()
+
+    def _send(self, message: bytes, address: tuple[str, int]) -> None:
+        with suppress(OSError):
+            self._socket.sendto(message + b"\0", address)

@@ -9,6 +9,7 @@ import json
 import re
 import shlex
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from enum import StrEnum
@@ -92,7 +93,8 @@ class TeamSpec:
     @property
     def takes_port(self) -> bool:
         """Whether it can play at another port than the default."""
-        return any("{port}" in word for _, words in self.clients() for word in words)
+        words = [*self.environment.values(), *(word for _, words in self.clients() for word in words)]
+        return any("{port}" in word for word in words)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +126,7 @@ class Limits:
         connect_s: from the start of a team to all its players being there.
         stall_s: without a sign of life of the server.
         match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10.
-        silent_cycles: of a player on the field who sends nothing, after which he counts as hung.
+        silent_cycles: of a player on the field who sends nothing, after which he counts as hung; 0 is never.
     """
 
     connect_s: float = 60.0
@@ -232,6 +234,8 @@ def quick_plan(left: str, right: str, *, matches: int, server: str, options: Map
     for side, text in (("left", left), ("right", right)):
         folder = Path(text).expanduser()
         script = folder / "start" if folder.is_dir() else folder
+        if folder.is_dir() and not script.is_file():
+            raise UsageError(f"--{side} {text}: has no script called start; give the command that starts the team")
         if script.is_file() and script.name == "start":
             name = script.absolute().parent.name
             team: dict[str, Any] = {"start": "./start", "folder": str(script.absolute().parent)}
@@ -259,7 +263,8 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
     settings = fill(PlaySettings, table.get("play", {}), "play", problems)
     limits = fill(Limits, table.get("limits", {}), "limits", problems)
     given = fill(ServerSpec, table.get("server", {}), "server", problems)
-    server = dataclasses.replace(given, options=_options(given.options, problems))
+    program = str(base / Path(given.command).expanduser()) if "/" in given.command else given.command
+    server = dataclasses.replace(given, command=program, options=_options(given.options, problems))
     teams: dict[str, TeamSpec] = {}
     for name, values in _entries(table.get("teams", {}), "teams", dict, problems).items():
         team = fill(TeamSpec, {"name": name, **values}, f"teams.{name}", problems)
@@ -304,8 +309,14 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
         problems.append(f"play.attempts: expected at least 1, got {settings.attempts}")
     if not 0 <= settings.seed < 2**31 - len(fixtures):
         problems.append(f"play.seed: expected a number from 0 to below 2^31, got {settings.seed}")
-    lengths = {item.name: getattr(limits, item.name) for item in fields(Limits)}
-    problems += [f"limits.{name}: expected at least 0, got {value}" for name, value in lengths.items() if value < 0]
+    for item in fields(Limits):
+        value, may_be_none = getattr(limits, item.name), item.name in ("match_s", "silent_cycles")
+        if value < 0 or not (value or may_be_none):
+            problems.append(
+                f"limits.{item.name}: expected {'at least' if may_be_none else 'more than'} 0, got {value:g}"
+            )
+    twice = [name for name, number in Counter(fixture.id for fixture in fixtures).items() if number > 1]
+    problems += [f"{name}: names two matches; call one of their teams otherwise" for name in twice]
     if problems:
         raise UsageError(f"{where}: {'; '.join(dict.fromkeys(problems))}")
     return Plan(fixtures=tuple(fixtures), attempts=settings.attempts)
@@ -403,6 +414,9 @@ def _wrong(team: TeamSpec) -> list[str]:
         problems += [f"{name}: no {{{found}}}; {choose(found, PLACEHOLDERS)}" for found in strange]
         if "{unum}" in text and name in ("command", "start"):
             problems.append(f"{name}: {{unum}} is for player, goalie and coach")
+    for name, text in team.environment.items():
+        strange = [found for found in _PLACEHOLDER.findall(text) if found not in PLACEHOLDERS or found == "unum"]
+        problems += [f"environment.{name}: no {{{found}}}; {choose(found, PLACEHOLDERS)}" for found in strange]
     if not Path(team.folder).is_dir():
         problems.append(f"{team.folder}: no such folder")
     return problems

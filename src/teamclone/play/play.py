@@ -28,7 +28,7 @@ from teamclone.files import held
 from teamclone.play.keeper import STOPPED, Order
 from teamclone.play.plan import Fixture, Plan
 from teamclone.play.processes import kill_marked
-from teamclone.play.record import Fault, Record, Side, Trouble, load_record, save_record
+from teamclone.play.record import Fault, Record, Side, Trouble, bury_logs, load_record, save_record
 from teamclone.play.server import find_server
 from teamclone.store.ingest import ingest
 from teamclone.store.store import Store
@@ -228,8 +228,6 @@ def _play_match(task: _Task) -> Record:
         if record.complete:
             _put(folder, home)
         else:
-            for path in [*folder.glob("*.rcg*"), *folder.glob("*.rcl*")]:
-                path.rename(f"{path}.failed")
             (task.out / FAILED / task.fixture.id).mkdir(exist_ok=True)
             _put(folder, task.out / FAILED / task.fixture.id / str(attempt))
     if record is None:
@@ -271,6 +269,7 @@ def _attempt(order: Order, wanted: Path) -> Record:
         f"the process that looked after the match ended with code {code}: {words[-1] if words else 'it said nothing'}"
     )
     record = _without_keeper(order.fixture, order.attempt, text)
+    bury_logs(order.folder)
     save_record(order.folder, record)
     return record
 

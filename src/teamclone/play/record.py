@@ -44,7 +44,7 @@ class Trouble:
     Attributes:
         side: "left" or "right" where a team is at fault, else None.
         unums: the players concerned, where they are known.
-        cycle: of the server; None before the kick-off.
+        cycle: of the server, 0 before the kick-off; None where it was never seen.
     """
 
     fault: Fault
@@ -140,6 +140,12 @@ class Record:
         kept |= {side: Side.from_json(kept[side]) for side in ("left", "right")}
         kept |= {name: tuple(kept[name]) for name in ("logs", "ports")}
         return cls(**kept)
+
+
+def bury_logs(folder: Path) -> None:
+    """Rename the logs of what is no match, so that no reader takes them for one."""
+    for path in [*folder.glob("*.rcg*"), *folder.glob("*.rcl*")]:
+        path.rename(f"{path}.failed")
 
 
 def save_record(folder: Path, record: Record) -> None:

@@ -127,7 +127,7 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
         "pairings 3: needs left and right",
         "server.options.port: is set by teamclone",
         "server.options.half_time: expected a number, text, true or false, got [1]",
-        "limits.connect_s: expected at least 0, got -1",
+        "limits.connect_s: expected more than 0, got -1",
         "limits.match_s: expected a number, got 'long'",
         "play.attempts: expected at least 1, got 0",
     ):

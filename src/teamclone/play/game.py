@@ -1,0 +1,303 @@
+"""A match while it is played: server and teams are started, watched as a monitor does, and ended."""
+
+from __future__ import annotations
+
+import os
+import select
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Iterable
+from contextlib import ExitStack, closing, suppress
+from pathlib import Path
+
+import psutil
+
+from teamclone.play.monitor import Monitor, Scene
+from teamclone.play.plan import N_UNUMS, Fixture, TeamSpec, filled_in
+from teamclone.play.ports import held_ports
+from teamclone.play.processes import MARK, end_all, start
+from teamclone.play.record import Fault
+from teamclone.play.server import gave_up, last_words, met_taken_port, server_environment, server_words
+
+SIDES = ("left", "right")
+LEAST_ROOM = 32 << 20
+"""Bytes that must be free: a match takes a quarter of it."""
+
+_HOST = "127.0.0.1"
+_POLL_S = 0.05
+_LOOK_S = 2.0
+"""Between two looks at a match that goes on."""
+_GONE_S = 0.3
+"""From the first player that is gone to the verdict: others may be about to follow."""
+_LEAVE_S = 1.0
+"""How long teams have to go by themselves when the server is gone."""
+_SERVER_LOG = "server.txt"
+
+
+class StoppedError(Exception):
+    """Who asked for the match no longer wants it."""
+
+
+class FailedError(Exception):
+    """The match cannot go on."""
+
+    def __init__(self, fault: Fault, text: str, *, side: int | None = None, unums: Iterable[int] = ()) -> None:
+        super().__init__(text)
+        self.fault, self.text, self.side, self.unums = fault, text, side, tuple(sorted(int(unum) for unum in unums))
+
+
+class Game:
+    """A match while it is played.
+
+    Args:
+        folder: where to, there and empty.
+        program: the server.
+    """
+
+    def __init__(self, fixture: Fixture, *, folder: Path, program: Path) -> None:
+        self.fixture, self.folder, self.program = fixture, folder, program
+        self.teams: tuple[TeamSpec, TeamSpec] = (fixture.left, fixture.right)
+        self.output = folder / "output"
+        self.output.mkdir()
+        self.held = ExitStack()
+        self.server: psutil.Popen | None = None
+        self.clients: tuple[dict[str, psutil.Popen], dict[str, psutil.Popen]] = ({}, {})
+        self.commands: dict[str, list[str]] = {}
+        self.port = 0
+        self.scene: Scene | None = None
+        self.seen: tuple[set[int], set[int]] = (set(), set())
+        self.heard_at = time.monotonic()
+        self.gone_at: float | None = None
+        self.kick_off_at: float | None = None
+        self.end_at: float | None = None
+        self.stop = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._ask_to_stop)
+
+    def _ask_to_stop(self, *_: object) -> None:
+        self.stop = True
+
+    def look(self, monitor: Monitor | None = None, *, seconds: float = _POLL_S) -> None:
+        """Wait a moment, then see what is new; raises what ends the match."""
+        readable, _, _ = select.select([sys.stdin], [], [], seconds)
+        if self.stop or (readable and not os.read(sys.stdin.fileno(), 1)):
+            raise StoppedError
+        scene = monitor.latest() if monitor else None
+        if scene is None:
+            return
+        now = time.monotonic()
+        self.heard_at, self.scene = now, scene
+        if scene.begun and self.kick_off_at is None:
+            self.kick_off_at = now
+        if scene.over:
+            self.end_at = self.end_at or now
+            return
+        for side in range(2):
+            gone = self.seen[side] - scene.present[side]
+            self.seen[side].update(scene.present[side])
+            if gone:
+                self.gone_at = self.gone_at or now
+                if now - self.gone_at > _GONE_S:
+                    text = f"{who(self.teams[side], gone)} gone{self.how_ended(side)}"
+                    raise FailedError(Fault.CRASHED, text, side=side, unums=gone)
+
+    def how_ended(self, side: int) -> str:
+        """Processes of a team that ended by themselves, in words."""
+        labels: dict[int, list[str]] = {}
+        for label, client in self.clients[side].items():
+            code = client.poll()
+            if code is not None:
+                labels.setdefault(code, []).append(label)
+        told = [f"{', '.join(ended)} {_ending(code)}" for code, ended in labels.items()]
+        return f" ({'; '.join(told)})" if told else ""
+
+    def is_over(self, *, kicked_off: bool = True) -> bool:
+        """Whether the server has ended as it should; whether it played to the end its logs must tell.
+
+        Args:
+            kicked_off: False while teams are still to come, when the server should not end at all.
+
+        Raises:
+            FailedError: it ended otherwise, or gives no sign of life.
+        """
+        code = None if self.server is None else self.server.poll()
+        if code is None:
+            if time.monotonic() - self.heard_at > self.fixture.limits.stall_s:
+                raise FailedError(Fault.STALLED, f"nothing from the server for {self.fixture.limits.stall_s:g} s")
+            return False
+        words = self.server_output()
+        if met_taken_port(words):
+            raise FailedError(Fault.NO_PORT, last_words(words))
+        if self.scene is None:
+            raise FailedError(Fault.SERVER_START, f"the server {_ending(code)}: {last_words(words)}")
+        if gave_up(words):
+            raise FailedError(Fault.HUNG, "the server waited for clients that did not answer")
+        if code != 0 or not kicked_off:
+            raise FailedError(Fault.SERVER_DIED, f"the server {_ending(code)} before the end: {last_words(words)}")
+        self.end_at = self.end_at or time.monotonic()
+        return True
+
+    def server_output(self) -> str:
+        with suppress(OSError):
+            return (self.output / _SERVER_LOG).read_text("utf-8", "replace")
+        return ""
+
+    def play(self) -> None:
+        """From the start of the server to its end. Afterwards call ``finish``, whatever happened.
+
+        Raises:
+            FailedError: it did not come to its end.
+            StoppedError: who asked for it no longer wants it.
+        """
+        free = shutil.disk_usage(self.folder).free
+        if free < LEAST_ROOM:
+            text = f"{free / 1e6:.0f} MB are free, a match needs {LEAST_ROOM / 1e6:.0f} MB"
+            raise FailedError(Fault.DISK_FULL, text)
+        self.port = self.take_port()
+        started = time.monotonic()
+        self.start_server()
+        with closing(Monitor(self.port)) as monitor:
+            self.wait_for_server(monitor)
+            self.bring_in_teams(monitor)
+            while not self.is_over():
+                # A player who is gone is kept in sight until it is known who is with him.
+                watching = self.kick_off_at is None or self.gone_at is not None
+                monitor.rest_s = 0.0 if watching else min(_LOOK_S, self.fixture.limits.stall_s / 4)
+                self.look(monitor)
+                if time.monotonic() - started > self.fixture.match_s:
+                    raise FailedError(Fault.TOO_LONG, f"not over after {self.fixture.match_s:g} s")
+
+    def take_port(self) -> int:
+        """The first of three ports, which are ours until the processes have ended."""
+        while True:
+            try:
+                port = self.held.enter_context(held_ports(any_block=self.fixture.takes_port))
+            except BlockingIOError:  # another match has the default, and will give it back
+                self.look(seconds=0.5)
+                continue
+            if port is None:
+                which = "no ports are" if self.fixture.takes_port else "the default port 6000 is not"
+                text = f"{which} free; teams without {{port}} in their commands need 6000"
+                raise FailedError(Fault.NO_PORT, text)
+            return port
+
+    def start_server(self) -> None:
+        conf = self.folder / "conf"
+        conf.mkdir()
+        words = server_words(self.program, self.fixture, port=self.port, logs=self.folder)
+        self.commands["server"] = words
+        self.heard_at = time.monotonic()
+        try:
+            self.server = start(
+                words,
+                folder=self.folder,
+                environment={**server_environment(conf), MARK: str(self.folder)},
+                output=self.output / _SERVER_LOG,
+            )
+        except OSError as error:
+            raise FailedError(Fault.SERVER_START, f"{self.program}: {error.strerror}") from None
+
+    def wait_for_server(self, monitor: Monitor) -> None:
+        while self.scene is None:
+            self.look(monitor)
+            self.is_over(kicked_off=False)
+
+    def bring_in_teams(self, monitor: Monitor) -> None:
+        """One client after the other, so that each has the number by which we know it; the left team's first of all."""
+        began = [0.0, 0.0]
+        waiting = [team.clients() for team in self.teams]
+        number = 0
+        while any(waiting):
+            number += 1
+            for side in range(2):
+                if waiting[side]:
+                    began[side] = began[side] or time.monotonic()
+                    self.start_client(side, *waiting[side].pop(0))
+                    if number == 1:
+                        self.wait_for_players(monitor, 1, side=side, began=began[side])
+            for side in range(2):
+                if waiting[side]:
+                    self.wait_for_players(monitor, number, side=side, began=began[side])
+        for side in range(2):
+            self.wait_for_players(monitor, N_UNUMS, side=side, began=began[side])
+
+    def wait_for_players(self, monitor: Monitor, number: int, *, side: int, began: float) -> None:
+        while len(self.seen[side]) < number:
+            self.look(monitor)
+            self.is_over(kicked_off=False)
+            broken = {
+                label: client.poll() for label, client in self.clients[side].items() if client.poll() not in (None, 0)
+            }
+            if broken:
+                label, code = next(iter(broken.items()))
+                words = last_words((self.output / f"{SIDES[side]}-{label}.txt").read_text("utf-8", "replace"))
+                text = f"{self.teams[side].name}: {label} {_ending(code)} before the kick-off: {words}"
+                raise FailedError(Fault.TEAM_START, text, side=side)
+            if time.monotonic() - began > self.fixture.limits.connect_s:
+                count = len(self.seen[side])
+                text = (
+                    f"{self.teams[side].name}: {count} of {N_UNUMS} players connected within "
+                    f"{self.fixture.limits.connect_s:g} s{self.how_ended(side)}"
+                )
+                raise FailedError(Fault.NOT_CONNECTED, text, side=side)
+
+    def start_client(self, side: int, label: str, words: list[str]) -> None:
+        team = self.teams[side]
+        values = {
+            "host": _HOST,
+            "port": self.port,
+            "coach_port": self.port + 1,
+            "olcoach_port": self.port + 2,
+            "team": team.name,
+            "folder": team.folder,
+        }
+        words = filled_in(words, values)
+        environment = dict(zip(team.environment, filled_in(list(team.environment.values()), values), strict=True))
+        self.commands[f"{SIDES[side]}-{label}"] = words
+        try:
+            self.clients[side][label] = start(
+                words,
+                folder=Path(team.folder),
+                environment={**environment, MARK: str(self.folder)},
+                output=self.output / f"{SIDES[side]}-{label}.txt",
+            )
+        except OSError as error:
+            text = f"{team.name}: {words[0]}: {error.strerror}"
+            raise FailedError(Fault.TEAM_START, text, side=side) from None
+
+    def finish(self, *, failed: bool) -> dict[str, dict[str, int | None]]:
+        """End all processes; how those of the teams ended that did so by themselves, by side and label."""
+        if self.server is not None and not failed:
+            psutil.wait_procs([*self.clients[0].values(), *self.clients[1].values()], timeout=_LEAVE_S)
+        elif self.server is not None:
+            with suppress(psutil.NoSuchProcess):
+                self.server.terminate()  # it then closes its logs
+            with suppress(psutil.TimeoutExpired):
+                self.server.wait(1)
+        exits = {
+            SIDES[side]: {label: client.poll() for label, client in self.clients[side].items()} for side in range(2)
+        }
+        end_all()
+        self.held.close()
+        return exits
+
+
+def who(team: TeamSpec, unums: Iterable[int]) -> str:
+    """Players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
+    numbers = sorted(unums)
+    if len(numbers) == N_UNUMS:
+        return f"{team.name}: the whole team is"
+    names = ", ".join(map(str, numbers))
+    return f"{team.name}: player{'s' if len(numbers) > 1 else ''} {names} {'are' if len(numbers) > 1 else 'is'}"
+
+
+def _ending(code: int | None) -> str:
+    """An exit code in words."""
+    if code is None:
+        return "still runs"
+    if code < 0:
+        with suppress(ValueError):
+            return f"was ended by {signal.Signals(-code).name}"
+    return f"ended with code {code}"

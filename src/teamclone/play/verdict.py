@@ -1,0 +1,61 @@
+"""What the logs of a match say of it: whole or not, and who was missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.errors import TeamcloneError
+from teamclone.logs import find_matches, read_pair
+from teamclone.logs.match import Match, Severity
+from teamclone.play.game import FailedError, who
+from teamclone.play.holes import Holes, count_holes
+from teamclone.play.plan import N_UNUMS, Fixture
+from teamclone.play.record import Fault
+from teamclone.rcss.playmodes import PlayMode
+
+
+def read_logs(folder: Path) -> tuple[Match | None, Holes | None, str | None]:
+    """The match in a folder with its holes, and what is wrong with it."""
+    try:
+        pairs = find_matches([folder])
+        if len(pairs) != 1 or pairs[0].rcg is None or pairs[0].rcl is None:
+            return None, None, f"expected one game log and one command log, got {len(pairs)} matches"
+        match = read_pair(pairs[0])
+        holes = count_holes(match) if len(match.frames["cycle"]) else None
+    except TeamcloneError as error:
+        return None, None, str(error)
+    worst = [problem for problem in match.problems if problem.severity is not Severity.NOTE]
+    return match, holes, str(worst[0]) if worst else None
+
+
+def verdict(fixture: Fixture, match: Match | None, holes: Holes | None, problem: str | None) -> FailedError | None:
+    """What speaks against a match whose server ended by itself; None where nothing does."""
+    if match is None or holes is None or problem:
+        return FailedError(Fault.BAD_LOGS, problem or "the game log has no frame")
+    last, mode = int(match.frames["cycle"][-1]), match.frames["playmode"][-1]
+    if not match.game.complete or mode != PlayMode.TIME_OVER or last < fixture.server.cycles:
+        return FailedError(Fault.BAD_LOGS, f"the game log ends at cycle {last} of {fixture.server.cycles}")
+    # Perhaps too shortly before the end to have been seen.
+    running = (match.frames["playmode"] != PlayMode.TIME_OVER)[:, None]
+    gone = ((match.players["state"] == 0) & running).any(0)
+    least = fixture.limits.silent_cycles or len(running)
+    return _blame(fixture, gone, Fault.CRASHED, "gone before the end") or _blame(
+        fixture, holes.longest_silence >= least, Fault.HUNG, f"silent for {least} cycles and more"
+    )
+
+
+def who_hung(fixture: Fixture, holes: Holes) -> FailedError | None:
+    """The players for whom a server waited in vain until it gave up: the others were heard longer."""
+    return _blame(fixture, holes.last_heard < holes.last_heard.max(), Fault.HUNG, "silent")
+
+
+def _blame(fixture: Fixture, flags: NDArray[np.bool_], fault: Fault, text: str) -> FailedError | None:
+    """The first team with such players."""
+    for side, team in enumerate((fixture.left, fixture.right)):
+        unums = [1 + int(index) for index in np.flatnonzero(flags[side * N_UNUMS : (side + 1) * N_UNUMS])]
+        if unums:
+            return FailedError(fault, f"{who(team, unums)} {text}", side=side, unums=unums)
+    return None

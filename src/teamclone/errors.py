@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -66,3 +68,10 @@ class PlayError(TeamcloneError):
 
 class RunError(TeamcloneError):
     """A run folder that is missing, incomplete or of another format number."""
+
+
+def choose(wrong: str, choices: Iterable[str]) -> str:
+    """The remedy for a name that is none: ``did you mean a or b?``, or all choices where none is near."""
+    known = list(choices)
+    near = difflib.get_close_matches(wrong, known, n=3)
+    return f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(known)}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import json
 import re
@@ -16,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from teamclone.errors import UsageError
+from teamclone.errors import UsageError, choose
 
 N_UNUMS = 11
 COACH = 12
@@ -368,12 +367,6 @@ def fill(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any:
             problems.append(f"{key}.{name}: expected {kinds[hints[name]]}, got {value!r}")
     needed = {item.name for item in fields(cls) if item.default is MISSING and item.default_factory is MISSING}
     return cls(**dict.fromkeys(needed - kept.keys(), ()), **kept)
-
-
-def choose(wrong: str, choices: list[str] | tuple[str, ...]) -> str:
-    """``did you mean a?``, or all choices where none is near."""
-    near = difflib.get_close_matches(wrong, choices, n=3)
-    return f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(choices)}"
 
 
 def _entries(table: Any, key: str, kind: type, problems: list[str]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -10,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
-from teamclone.errors import UsageError
+from teamclone.errors import UsageError, choose
 from teamclone.models.config import ACTIVATIONS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
 from teamclone.rcss.player_types import GROUPS
 
@@ -295,11 +294,9 @@ def _keys(table: dict[str, dict[str, Any]]) -> Iterable[str]:
 
 
 def _choose(wrong: str, choices: list[str]) -> str:
-    """``did you mean a or b?``, or all choices where none is near."""
-    near = difflib.get_close_matches(wrong, choices, n=3)
-    if not near:  # `epochs` for `train.epochs`
-        near = [choice for choice in choices if choice.partition(".")[2] == wrong.rpartition(".")[2]]
-    return f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(choices)}"
+    """As `errors.choose`, which also knows `epochs` for `train.epochs`."""
+    same = [choice for choice in choices if choice.partition(".")[2] == wrong]
+    return f"did you mean {' or '.join(same)}?" if same else choose(wrong, choices)
 
 
 def _value(text: str) -> Any:

@@ -28,9 +28,6 @@ from teamclone.play.record import NAME
 from teamclone.store import open_store
 
 REAL = shutil.which("rcssserver")
-ANSWER_MS = "200"
-"""How long the stand-in waits for a client; the real one takes 1250 ms, twenty times over."""
-
 SERVERS = [
     pytest.param(str(STANDIN / "rcssserver"), id="standin"),
     pytest.param(
@@ -46,9 +43,8 @@ both_servers = pytest.mark.parametrize("server", SERVERS)
 
 
 @pytest.fixture(autouse=True)
-def _nothing_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _nothing_stays(tmp_path: Path) -> Iterator[None]:
     """Whatever happens in a test, no process of its matches outlives it."""
-    monkeypatch.setenv("STANDIN_WAIT_MS", ANSWER_MS)
     yield
     assert strays(tmp_path) == []
 

@@ -64,6 +64,11 @@ def play(
         )
     with executor_of(scheduler, jobs=jobs) as executor, progress("play") as bar:
         task = bar.add_task("", total=len(asked.fixtures))
+
+        def tell(record: Record) -> None:
+            count = f"{int(bar.tasks[task].completed) + 1} of {len(asked.fixtures)}"
+            bar.console.print(f"{count}: {line_of(record)}", markup=False, highlight=False, soft_wrap=True)
+
         report = run(
             asked,
             out,
@@ -72,7 +77,7 @@ def play(
             jobs=jobs,
             retry_failed=retry_failed,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
-            on_record=lambda record: bar.console.print(line_of(record), markup=False, highlight=False, soft_wrap=True),
+            on_record=tell,
         )
     if as_json:
         print_json(report.to_json())

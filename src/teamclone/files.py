@@ -57,7 +57,8 @@ def held(path: Path, *, busy: Exception | None = None) -> Iterator[None]:
         return
     import fcntl
 
-    handle = os.open(path, os.O_RDONLY)
+    # Over NFS only what may be written can be locked.
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -14,9 +15,10 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.errors import PlayError, UsageError
 from teamclone.evaluation.evaluate import evaluate, save_evaluation
 from teamclone.evaluation.report import fresh_evaluation, make_report
-from teamclone.play.plan import Plan, fill, plan_from, read_plan
+from teamclone.play.plan import Plan, fill, folder_of, plan_from, read_plan
 from teamclone.play.play import PlayReport, play
 from teamclone.play.record import Record
+from teamclone.play.server import find_server
 from teamclone.store import create_store
 from teamclone.training.config import Config, differences, load_config
 from teamclone.training.loop import Progress, train
@@ -106,7 +108,7 @@ def load_pipeline(path: Path) -> Pipeline:
         UsageError: naming what is wrong, in one line.
     """
     table = read_plan(path)
-    plan = plan_from(table, where=str(path), base=path.absolute().parent)
+    plan = plan_from(table, where=str(path), base=folder_of(path))
     problems: list[str] = []
     store = fill(StoreSettings, table.get("store", {}), "store", problems)
     training = fill(TrainSettings, table.get("train", {}), "train", problems)
@@ -129,7 +131,7 @@ def load_pipeline(path: Path) -> Pipeline:
         raise UsageError(f"{path}: {'; '.join(problems)}")
     location = store.location
     if location and "://" not in location:
-        location = str(path.absolute().parent / Path(location).expanduser())
+        location = str(folder_of(path) / Path(location).expanduser())
     return Pipeline(
         plan=plan,
         store=location,
@@ -158,8 +160,10 @@ def run_pipeline(
         TeamcloneError: of the stage that failed; what the stages before made stays.
     """
     watch = watch or Watch()
-    out = out.absolute()
+    out = out.resolve()
     started = time.monotonic()
+    if executor is None:
+        find_server(pipeline.plan.fixtures[0].server)  # before anything is made
     store = create_store(pipeline.store or str(out / STORE))
     report = play(
         pipeline.plan,
@@ -223,8 +227,8 @@ def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> 
     if is_run(folder):
         run = open_run(folder)
         if run.dataset_id != dataset.id or differences(run.config, config):
-            number = 1 + sum(1 for _ in folder.parent.glob(f"{RUN}-before-*"))
-            folder.rename(folder.with_name(f"{RUN}-before-{number}"))
+            names = (folder.with_name(f"{RUN}-before-{number}") for number in itertools.count(1))
+            folder.rename(next(name for name in names if not name.exists()))
         elif len(run.history()) >= config.train.epochs:
             return run, False
         else:

@@ -217,7 +217,7 @@ def test_matches_are_played_on_a_cluster_and_a_killed_worker_costs_none(cluster:
         "play", plan, "--out", out, "--scheduler", cluster.address, "--ingest", tmp_path / "store", "--json"
     )
     try:
-        wait_for(lambda: len(list(out.glob(".playing/*/output/right-team.txt"))) == 2, "match on each worker")
+        wait_for(lambda: len(list(out.glob(".playing/*/*/output/right-team.txt"))) == 2, "match on each worker")
         cluster.workers[0].kill()
         text, err = process.communicate(timeout=100)
     finally:
@@ -233,7 +233,7 @@ def test_ctrl_c_ends_the_matches_on_a_cluster(cluster: Cluster, tmp_path: Path) 
     plan = write_plan(tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300)
     process = start("play", plan, "--out", out, "--scheduler", cluster.address)
     try:
-        wait_for(lambda: len(list(out.glob(".playing/*/output/right-team.txt"))) == 2, "match on each worker")
+        wait_for(lambda: len(list(out.glob(".playing/*/*/output/right-team.txt"))) == 2, "match on each worker")
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=60)
     finally:

@@ -14,6 +14,7 @@ import signal
 import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,11 @@ import pytest
 from command import teamclone
 from disk import small_disk
 from playing import STANDIN, TEAM, started, strays, write_plan
+from teamclone.errors import UsageError
 from teamclone.logs import read_match
+from teamclone.play.keeper import Order
+from teamclone.play.plan import load_plan
+from teamclone.play.play import _attempt
 from teamclone.play.record import NAME
 from teamclone.store import open_store
 
@@ -400,10 +405,71 @@ def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_p
     assert not (tmp_path / "out").exists()
 
 
-def wait_for_match(out: Path, *, number: int = 1) -> None:
+def wait_for_match(out: Path, *, number: int = 1, glob: str = ".playing/*/*/output/right-team.txt") -> None:
     """Until so many matches are being played, with all that belongs to them."""
     deadline = time.monotonic() + 60
-    while len(list(out.glob(".playing/*/output/right-team.txt"))) < number:
+    while len(list(out.glob(glob))) < number:
         assert time.monotonic() < deadline, "the matches do not begin"
         time.sleep(0.05)
     time.sleep(1)
+
+
+@both_servers
+def test_a_folder_may_be_called_as_one_likes(tmp_path: Path, server: str) -> None:
+    plan = write_plan(tmp_path, [("Red", "Blue")], server=server)
+    assert play(plan, tmp_path / "it's = a: folder")["complete"] == 1
+
+
+def test_a_server_that_waits_for_clients_after_the_end_has_played_the_match(tmp_path: Path) -> None:
+    """Clients may stop answering when all is over; the server then says that it waited too long."""
+    plan = write_plan(tmp_path, [("Red", "Blue")], teams={"Red": f"{TEAM} --hang-at 40"})
+    plan.write_text(plan.read_text().replace("game_over_wait = 5", "game_over_wait = 100"))
+    [record] = play(plan, tmp_path / "out")["records"]
+    assert record["outcome"] == "complete"
+    assert record["server"]["missed_cycles"] > 20
+
+
+def test_a_match_without_its_record_is_played_again_once(tmp_path: Path) -> None:
+    plan, out = write_plan(tmp_path, [("Red", "Blue")]), tmp_path / "out"
+    play(plan, out)
+    (out / "matches" / "Red-vs-Blue-1" / NAME).unlink()
+    assert play(plan, out)["played"] == 1
+    assert play(plan, out)["played"] == 0
+
+
+def test_a_module_in_the_current_folder_is_not_taken_for_python_s_own(tmp_path: Path) -> None:
+    (tmp_path / "platform.py").write_text("raise SystemExit('not me')")
+    plan = write_plan(tmp_path, [("Red", "Blue")])
+    done = teamclone("play", plan, "--out", tmp_path / "out", cwd=tmp_path)
+    assert "1 complete" in done.stdout
+
+
+def test_a_long_command_is_a_command(tmp_path: Path) -> None:
+    red = f"sh -c 'true /{'x' * 300}; exec {TEAM}'".replace("'", '"')
+    assert play(write_plan(tmp_path, [("Red", "Blue")], teams={"Red": red}), tmp_path / "out")["complete"] == 1
+
+
+def test_the_server_s_cycle_may_be_another(tmp_path: Path) -> None:
+    """What a match's length should be is what its own log says, not what we think."""
+    plan = write_plan(tmp_path, [("Red", "Blue")])
+    plan.write_text(plan.read_text().replace("half_time = 2,", "half_time = 1, nr_normal_halfs = 4,"))
+    [record] = play(plan, tmp_path / "out")["records"]
+    assert record["cycles"] == 40
+
+
+def test_ctrl_c_does_not_wait_for_a_keeper_that_is_stuck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("teamclone.play.play._END_S", 1.0)
+    out = tmp_path / "out"
+    fixture = load_plan(write_plan(tmp_path, [("Red", "Blue")], half_time=300)).fixtures[0]
+    folder, wanted = out / "match", out / "wanted"
+    folder.mkdir(parents=True)
+    wanted.touch()
+    order = Order(fixture=fixture, folder=folder, server=STANDIN / "rcssserver", attempt=1)
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(_attempt, order, wanted)
+        wait_for_match(out, glob="match/output/right-team.txt")
+        [keeper] = [child for child in psutil.Process().children() if "teamclone.play.keeper" in child.cmdline()]
+        keeper.suspend()
+        wanted.unlink()
+        with pytest.raises(UsageError, match="no longer wanted"):
+            asked.result(20)

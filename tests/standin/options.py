@@ -72,6 +72,8 @@ def read_options(arguments: list[str]) -> dict[str, dict[str, str]]:
         known = options.get(module, {})
         if name not in known:
             _refuse(module, name, "no parameter")
+        elif set(value) & set(" '=:"):
+            sys.exit("cmd line args: 1: error: unknown parse error")
         elif known[name].startswith('"'):
             known[name] = '"{}"'.format(value.strip("\"'"))
         elif value in SWITCHES or re.fullmatch(r"-?[0-9.]+", value):

@@ -19,7 +19,7 @@ from teamclone.play.plan import N_UNUMS, Fixture, TeamSpec, filled_in
 from teamclone.play.ports import held_ports
 from teamclone.play.processes import MARK, end_all, start
 from teamclone.play.record import Fault
-from teamclone.play.server import gave_up, last_words, met_taken_port, server_environment, server_words
+from teamclone.play.server import last_words, met_taken_port, server_environment, server_words
 
 SIDES = ("left", "right")
 LEAST_ROOM = 32 << 20
@@ -94,14 +94,18 @@ class Game:
         if scene.over:
             self.end_at = self.end_at or now
             return
+        missing = False
         for side in range(2):
             gone = self.seen[side] - scene.present[side]
             self.seen[side].update(scene.present[side])
             if gone:
+                missing = True
                 self.gone_at = self.gone_at or now
                 if now - self.gone_at > _GONE_S:
                     text = f"{who(self.teams[side], gone)} gone{self.how_ended(side)}"
                     raise FailedError(Fault.CRASHED, text, side=side, unums=gone)
+        if not missing:
+            self.gone_at = None
 
     def how_ended(self, side: int) -> str:
         """Processes of a team that ended by themselves, in words."""
@@ -124,16 +128,15 @@ class Game:
         """
         code = None if self.server is None else self.server.poll()
         if code is None:
-            if time.monotonic() - self.heard_at > self.fixture.limits.stall_s:
+            silent = time.monotonic() - self.heard_at > self.fixture.limits.stall_s
+            if silent and self.end_at is None:
                 raise FailedError(Fault.STALLED, f"nothing from the server for {self.fixture.limits.stall_s:g} s")
-            return False
+            return silent
         words = self.server_output()
         if met_taken_port(words):
             raise FailedError(Fault.NO_PORT, last_words(words))
         if self.scene is None:
             raise FailedError(Fault.SERVER_START, f"the server {_ending(code)}: {last_words(words)}")
-        if gave_up(words):
-            raise FailedError(Fault.HUNG, "the server waited for clients that did not answer")
         if code != 0 or not kicked_off:
             raise FailedError(Fault.SERVER_DIED, f"the server {_ending(code)} before the end: {last_words(words)}")
         self.end_at = self.end_at or time.monotonic()
@@ -166,7 +169,11 @@ class Game:
                 watching = self.kick_off_at is None or self.gone_at is not None
                 monitor.rest_s = 0.0 if watching else min(_LOOK_S, self.fixture.limits.stall_s / 4)
                 self.look(monitor)
+                if self.kick_off_at is None:
+                    self.check_clients()
                 if time.monotonic() - started > self.fixture.match_s:
+                    if self.end_at is not None:
+                        return
                     raise FailedError(Fault.TOO_LONG, f"not over after {self.fixture.match_s:g} s")
 
     def take_port(self) -> int:
@@ -186,7 +193,7 @@ class Game:
     def start_server(self) -> None:
         conf = self.folder / "conf"
         conf.mkdir()
-        words = server_words(self.program, self.fixture, port=self.port, logs=self.folder)
+        words = server_words(self.program, self.fixture, port=self.port)
         self.commands["server"] = words
         self.heard_at = time.monotonic()
         try:
@@ -227,14 +234,7 @@ class Game:
         while len(self.seen[side]) < number:
             self.look(monitor)
             self.is_over(kicked_off=False)
-            broken = {
-                label: client.poll() for label, client in self.clients[side].items() if client.poll() not in (None, 0)
-            }
-            if broken:
-                label, code = next(iter(broken.items()))
-                words = last_words((self.output / f"{SIDES[side]}-{label}.txt").read_text("utf-8", "replace"))
-                text = f"{self.teams[side].name}: {label} {_ending(code)} before the kick-off: {words}"
-                raise FailedError(Fault.TEAM_START, text, side=side)
+            self.check_clients()
             if time.monotonic() - began > self.fixture.limits.connect_s:
                 count = len(self.seen[side])
                 text = (
@@ -242,6 +242,16 @@ class Game:
                     f"{self.fixture.limits.connect_s:g} s{self.how_ended(side)}"
                 )
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)
+
+    def check_clients(self) -> None:
+        """Raises that a process ended before the kick-off, unless it ended well, as scripts do."""
+        for side in range(2):
+            for label, client in self.clients[side].items():
+                code = client.poll()
+                if code not in (None, 0):
+                    words = last_words((self.output / f"{SIDES[side]}-{label}.txt").read_text("utf-8", "replace"))
+                    text = f"{self.teams[side].name}: {label} {_ending(code)} before the kick-off: {words}"
+                    raise FailedError(Fault.TEAM_START, text, side=side)
 
     def start_client(self, side: int, label: str, words: list[str]) -> None:
         team = self.teams[side]
@@ -269,13 +279,13 @@ class Game:
 
     def finish(self, *, failed: bool) -> dict[str, dict[str, int | None]]:
         """End all processes; how those of the teams ended that did so by themselves, by side and label."""
-        if self.server is not None and not failed:
-            psutil.wait_procs([*self.clients[0].values(), *self.clients[1].values()], timeout=_LEAVE_S)
-        elif self.server is not None:
+        if self.server is not None and self.server.poll() is None:
             with suppress(psutil.NoSuchProcess):
                 self.server.terminate()  # it then closes its logs
             with suppress(psutil.TimeoutExpired):
                 self.server.wait(1)
+        if not failed:
+            psutil.wait_procs([*self.clients[0].values(), *self.clients[1].values()], timeout=_LEAVE_S)
         exits = {
             SIDES[side]: {label: client.poll() for label, client in self.clients[side].items()} for side in range(2)
         }

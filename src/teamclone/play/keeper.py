@@ -14,7 +14,6 @@ import platform
 import shutil
 import sys
 import time
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,14 +26,14 @@ from teamclone.play.holes import Holes
 from teamclone.play.plan import N_UNUMS, Fixture
 from teamclone.play.processes import adopt_orphans
 from teamclone.play.record import Fault, Record, Side, Trouble, bury_logs, save_record
-from teamclone.play.server import hashes, programs_of, server_report
-from teamclone.play.verdict import read_logs, verdict, who_hung
+from teamclone.play.server import gave_up, hashes, programs_of, server_report
+from teamclone.play.verdict import read_logs, verdict
 
 STOPPED = 3
 """Exit code of a keeper that was asked to stop."""
 
 FULL = 1 << 20
-"""With fewer bytes left, what went wrong is the disk's fault."""
+"""If fewer bytes than this can be written, what went wrong is the disk's fault."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,9 +77,7 @@ def keep(order: Order) -> Record:
         exits = game.finish(failed=failed is not None)
     match, holes, problem = read_logs(order.folder)
     if failed is None:
-        failed = verdict(order.fixture, match, holes, problem)
-    elif failed.fault is Fault.HUNG and holes is not None:
-        failed = who_hung(order.fixture, holes) or failed
+        failed = verdict(order.fixture, match, holes, problem, gave_up=gave_up(game.server_output()))
     if failed is not None and failed.fault in (Fault.SERVER_DIED, Fault.BAD_LOGS) and _is_full(order.folder):
         failed = FailedError(Fault.DISK_FULL, f"no room is left ({failed.text})")
     shutil.rmtree(order.folder / "conf", ignore_errors=True)
@@ -153,10 +150,22 @@ def _record(
 
 
 def _is_full(folder: Path) -> bool:
+    """Tried, since quotas count, too."""
+    test = folder / "room"
     try:
-        return shutil.disk_usage(folder).free < FULL
+        test.write_bytes(bytes(FULL))
     except OSError:
-        return False
+        return True
+    finally:
+        test.unlink(missing_ok=True)
+    return False
+
+
+def _make_last(folder: Path) -> None:
+    """Have the logs on disk before the match is said to be whole."""
+    for path in folder.glob("*.rc[gl]*"):
+        with path.open("rb") as file:
+            os.fsync(file.fileno())
 
 
 def main() -> None:
@@ -171,8 +180,12 @@ def main() -> None:
         record = keep(order)
     except StoppedError:
         sys.exit(STOPPED)
-    with suppress(OSError):
+    try:
+        _make_last(order.folder)
         save_record(order.folder, record)
+    except OSError as error:
+        trouble = Trouble(fault=Fault.DISK_FULL, text=f"the match cannot be kept ({error.strerror or error})")
+        record = dataclasses.replace(record, trouble=trouble)
     json.dump(record.to_json(), sys.stdout)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
+import os
 import re
 import shlex
 import tomllib
@@ -45,7 +47,12 @@ OURS = (
 OTHER_SECTIONS = ("store", "dataset", "train", "evaluate")
 """Sections of a plan that are for `teamclone run`, see `pipeline`."""
 
-_PLACEHOLDER = re.compile(r"\{(\w*)\}")
+_PLACEHOLDER = re.compile(r"(?<!\$)\{(\w*)\}")  # ${NAME} is for a shell
+_VARIABLE = re.compile(r"[A-Za-z_]\w*")
+_WORD = re.compile(r"[\w./+-]*")
+"""What the server's parser takes as the value of an option."""
+_NUMBERS = ("half_time", "nr_normal_halfs", "extra_half_time", "nr_extra_halfs", "simulator_step")
+MAX_FIXTURES = 100_000
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
 
@@ -112,9 +119,12 @@ class ServerSpec:
         return self.options.get("server::synch_mode") is True
 
     @property
-    def cycles(self) -> int:
-        """Of the regular halves."""
-        return int(10 * self.number("half_time", 300) * self.number("nr_normal_halfs", 2))
+    def most_cycles(self) -> int:
+        """That a match may have, with all extra halves, roughly."""
+        regular = self.number("half_time", 300) * self.number("nr_normal_halfs", 2)
+        extra = self.number("extra_half_time", 100) * self.number("nr_extra_halfs", 2)
+        shoot_out = 200 if self.options.get("server::penalty_shoot_outs") else 0
+        return int(1000 * (regular + extra + shoot_out) / max(self.number("simulator_step", 100), 1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +134,7 @@ class Limits:
     Attributes:
         connect_s: from the start of a team to all its players being there.
         stall_s: without a sign of life of the server.
-        match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10.
+        match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10, and a few minutes.
         silent_cycles: of a player on the field who sends nothing, after which he counts as hung; 0 is never.
     """
 
@@ -159,7 +169,7 @@ class Fixture:
         """The longest it may take."""
         if self.limits.match_s:
             return self.limits.match_s
-        return 4 * self.server.cycles / (25 if self.server.synch else 10) + 2 * self.limits.connect_s + 60
+        return 4 * self.server.most_cycles / (25 if self.server.synch else 10) + 2 * self.limits.connect_s + 60
 
     @property
     def fingerprint(self) -> str:
@@ -208,7 +218,12 @@ def load_plan(path: Path) -> Plan:
     Raises:
         UsageError: naming all that is wrong, in one line.
     """
-    return plan_from(read_plan(path), where=str(path), base=path.absolute().parent)
+    return plan_from(read_plan(path), where=str(path), base=folder_of(path))
+
+
+def folder_of(path: Path) -> Path:
+    """Of a plan, from which its paths go."""
+    return Path(os.path.normpath(path.absolute().parent))
 
 
 def read_plan(path: Path) -> dict[str, Any]:
@@ -219,7 +234,7 @@ def read_plan(path: Path) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise UsageError(f"{path}: is not TOML: {error}") from None
 
 
@@ -231,13 +246,15 @@ def quick_plan(left: str, right: str, *, matches: int, server: str, options: Map
     """
     teams = {}
     for side, text in (("left", left), ("right", right)):
-        folder = Path(text).expanduser()
-        script = folder / "start" if folder.is_dir() else folder
-        if folder.is_dir() and not script.is_file():
+        problems: list[str] = []
+        folder = Path(_path(text, Path.cwd(), f"--{side}", problems))
+        is_folder = os.path.isdir(folder)  # noqa: PTH112 (any text)
+        script = folder / "start" if is_folder else folder
+        if is_folder and not script.is_file():
             raise UsageError(f"--{side} {text}: has no script called start; give the command that starts the team")
-        if script.is_file() and script.name == "start":
-            name = script.absolute().parent.name
-            team: dict[str, Any] = {"start": "./start", "folder": str(script.absolute().parent)}
+        if script.name == "start" and script.is_file():
+            name = script.parent.name
+            team: dict[str, Any] = {"start": "./start", "folder": str(script.parent)}
         else:
             name, team = side, {"command": text}
         teams[name if name not in teams else f"{name}-2"] = team
@@ -262,12 +279,12 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
     settings = fill(PlaySettings, table.get("play", {}), "play", problems)
     limits = fill(Limits, table.get("limits", {}), "limits", problems)
     given = fill(ServerSpec, table.get("server", {}), "server", problems)
-    program = str(base / Path(given.command).expanduser()) if "/" in given.command else given.command
+    program = _path(given.command, base, "server.command", problems) if "/" in given.command else given.command
     server = dataclasses.replace(given, command=program, options=_options(given.options, problems))
     teams: dict[str, TeamSpec] = {}
     for name, values in _entries(table.get("teams", {}), "teams", dict, problems).items():
         team = fill(TeamSpec, {"name": name, **values}, f"teams.{name}", problems)
-        folder = str((base / Path(team.folder).expanduser()).absolute())
+        folder = _path(team.folder, base, f"teams.{name}.folder", problems)
         teams[name] = dataclasses.replace(team, folder=folder)
         problems += [f"teams.{name}: {problem}" for problem in _wrong(teams[name])]
     pairings = table.get("pairings", [])
@@ -291,6 +308,9 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
                 problems.append(f"{key}: {left} against itself; the server takes each name once")
             if strange or left == right:
                 continue
+            if len(fixtures) + pairing.matches > MAX_FIXTURES:
+                problems.append(f"{key}: more than {MAX_FIXTURES} matches in one plan")
+                continue
             for _ in range(pairing.matches):
                 count = counts[left, right] = counts.get((left, right), 0) + 1
                 fixture = Fixture(
@@ -310,7 +330,7 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
         problems.append(f"play.seed: expected a number from 0 to below 2^31, got {settings.seed}")
     for item in fields(Limits):
         value, may_be_none = getattr(limits, item.name), item.name in ("match_s", "silent_cycles")
-        if value < 0 or not (value or may_be_none):
+        if not 0 <= value < math.inf or not (value or may_be_none):
             problems.append(
                 f"limits.{item.name}: expected {'at least' if may_be_none else 'more than'} 0, got {value:g}"
             )
@@ -388,7 +408,7 @@ def _wrong(team: TeamSpec) -> list[str]:
     problems = []
     if not _NAME.fullmatch(team.name):
         problems.append("a name is made of at most 40 letters, digits, '_', '.', '+' and '-'")
-    ways = [name for name in ("command", "start", "player") if getattr(team, name)]
+    ways = [name for name in ("command", "start", "player") if getattr(team, name).strip()]
     if len(ways) != 1:
         got = " and ".join(ways) or "none"
         problems.append(f"needs one of command (the whole team), start (the league's script) and player, got {got}")
@@ -410,7 +430,13 @@ def _wrong(team: TeamSpec) -> list[str]:
     for name, text in team.environment.items():
         strange = [found for found in _PLACEHOLDER.findall(text) if found not in PLACEHOLDERS or found == "unum"]
         problems += [f"environment.{name}: no {{{found}}}; {choose(found, PLACEHOLDERS)}" for found in strange]
-    if not Path(team.folder).is_dir():
+    problems += [
+        f"environment: no variable can be called {name!r}" for name in team.environment if not _VARIABLE.fullmatch(name)
+    ]
+    texts = (team.command, team.start, team.player, team.goalie, team.coach, *team.environment.values())
+    if any("\0" in text for text in texts):
+        problems.append("commands and variables cannot hold a NUL byte")
+    if not os.path.isdir(team.folder):  # noqa: PTH112 (any text)
         problems.append(f"{team.folder}: no such folder")
     return problems
 
@@ -418,11 +444,29 @@ def _wrong(team: TeamSpec) -> list[str]:
 def _options(given: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
     """The server's options under their full names, with those that we set unless told otherwise."""
     options = dict(OPTIONS)
-    for name, value in given.items():
+    switches = {"on": True, "true": True, "off": False, "false": False}
+    for name, text in given.items():
+        value = switches.get(text.lower(), text) if isinstance(text, str) else text
         full = name if "::" in name else f"server::{name}"
         if full.removeprefix("server::") in OURS or full == "player::random_seed":
             problems.append(f"server.options.{name}: is set by teamclone; leave it out")
-        elif not isinstance(value, bool | int | float | str):
-            problems.append(f"server.options.{name}: expected a number, text, true or false, got {value!r}")
+        is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        if full.removeprefix("server::") in _NUMBERS and not (is_number and float(value) >= 0):
+            problems.append(f"server.options.{name}: expected a number, got {value!r}")
+        elif full == "server::game_log_version" and value in (1, 2, 3):
+            problems.append(
+                f"server.options.{name}: a log of version {value} does not hold enough; choose from 4, 5, 6, -1"
+            )
+        elif not (is_number or isinstance(value, bool) or (isinstance(value, str) and _WORD.fullmatch(value))):
+            problems.append(f"server.options.{name}: expected a number, a word, true or false, got {value!r}")
         options[full] = value
     return options
+
+
+def _path(text: str, base: Path, key: str, problems: list[str]) -> str:
+    """A path from ``base``, with ``~`` and ``..`` resolved, but no links."""
+    try:
+        return os.path.normpath(base / Path(text).expanduser())
+    except RuntimeError as error:  # of ~somebody
+        problems.append(f"{key}: {text}: {error}")
+        return str(base)

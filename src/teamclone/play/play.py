@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from teamclone.errors import PlayError, UsageError
+from teamclone.errors import PlayError, StoreError, UsageError
 from teamclone.files import held
 from teamclone.play.keeper import STOPPED, Order
 from teamclone.play.plan import Fixture, Plan
@@ -39,6 +39,8 @@ FAILED = "failed"
 _PLAYING = ".playing"
 _LOCK = ".lock"
 _POLL_S = 0.2
+_END_S = 30.0
+"""How long a keeper has to end its match."""
 
 OnRecord = Callable[[Record], None]
 """Called with what became of a match, as soon as that is known."""
@@ -115,7 +117,7 @@ def play(
         ClusterError: the connection to the executor's workers was lost.
     """
     start = time.monotonic()
-    out = out.absolute()
+    out = out.resolve()
     if executor is None:
         find_server(plan.fixtures[0].server)
     for folder in (out / MATCHES, out / FAILED):
@@ -124,19 +126,19 @@ def play(
     lock.touch()
     with ExitStack() as stack:
         stack.enter_context(held(lock, busy=PlayError(f"{out}: another process plays into it; wait for its end")))
-        playing = out / _PLAYING
-        _clear(playing)
-        playing.mkdir()
-        stack.callback(_clear, playing)
-        wanted = playing / f"{uuid.uuid4().hex}.wanted"
+        _clear(out / _PLAYING)
+        stack.callback(_clear, out / _PLAYING)
+        # A folder of its own: workers that do not know yet that an earlier call is over may still write into theirs.
+        wanted = out / _PLAYING / uuid.uuid4().hex[:8] / "wanted"
+        wanted.parent.mkdir(parents=True)
         wanted.touch()
         if retry_failed:
             for fixture in plan.fixtures:
                 shutil.rmtree(out / FAILED / fixture.id, ignore_errors=True)
         known = {fixture.id: _known(fixture, plan.attempts, out) for fixture in plan.fixtures}
         records = {name: record for name, record in known.items() if record is not None}
-        if store is not None:
-            _ingest([record for record in records.values() if record.complete], out, store)
+        stored = _Stored(out, store)
+        stored.add([record for record in records.values() if record.complete])
         tasks = [
             _Task(fixture=fixture, attempts=plan.attempts, out=out, wanted=wanted)
             for fixture in plan.fixtures
@@ -156,9 +158,10 @@ def play(
                 raise PlayError(
                     f"{out}: {record.trouble.text}; make room and give the same command again, what was played stays"
                 )
-            if store is not None and record.complete:
-                _ingest([record], out, store)
+            with suppress(StoreError):  # busy, perhaps: tried again with the next match, and at the end
+                stored.add([record] if record.complete else [])
             on_progress(len(records), len(plan.fixtures))
+        stored.add([])
     return PlayReport(
         records=tuple(records[fixture.id] for fixture in plan.fixtures),
         played=len(tasks),
@@ -196,9 +199,26 @@ def _attempts(fixture: Fixture, out: Path) -> list[Record]:
     return [record for record in found if record is not None]
 
 
-def _ingest(records: Sequence[Record], out: Path, store: Store) -> None:
-    if records:
-        ingest([out / MATCHES / record.id for record in records], store, jobs=1)
+class _Stored:
+    """The matches of a folder, as they go into a store."""
+
+    def __init__(self, out: Path, store: Store | None) -> None:
+        self._matches, self._store = out / MATCHES, store
+        self._waiting: list[Record] = []
+        if store is not None:
+            with store.writing():  # what cannot be written is told at once
+                pass
+
+    def add(self, records: Sequence[Record]) -> None:
+        """Add these, and those that could not be added before.
+
+        Raises:
+            StoreError: the store cannot be written now; they are kept for the next time.
+        """
+        self._waiting += records
+        if self._store is not None and self._waiting:
+            ingest([self._matches / record.id for record in self._waiting], self._store, jobs=1)
+        self._waiting = []
 
 
 def _play_match(task: _Task) -> Record:
@@ -219,7 +239,7 @@ def _play_match(task: _Task) -> Record:
     for attempt in range(1 + len(_attempts(task.fixture, task.out)), 1 + task.attempts):
         if record is not None and record.complete:
             break
-        folder = task.out / _PLAYING / f"{task.fixture.id}.{uuid.uuid4().hex[:8]}"
+        folder = task.wanted.with_name(f"{task.fixture.id}.{uuid.uuid4().hex[:8]}")
         folder.mkdir()
         record = _attempt(Order(fixture=task.fixture, folder=folder, server=server, attempt=attempt), task.wanted)
         if record.trouble and record.trouble.fault is Fault.DISK_FULL:
@@ -243,7 +263,7 @@ def _attempt(order: Order, wanted: Path) -> Record:
     """
     with tempfile.TemporaryFile() as answer, (order.folder / "keeper.txt").open("wb") as errors:
         keeper = subprocess.Popen(
-            (sys.executable, "-m", "teamclone.play.keeper"),
+            (sys.executable, "-P", "-m", "teamclone.play.keeper"),
             stdin=subprocess.PIPE,
             stdout=answer,
             stderr=errors,
@@ -257,7 +277,12 @@ def _attempt(order: Order, wanted: Path) -> Record:
             while keeper.poll() is None and wanted.exists():
                 with suppress(subprocess.TimeoutExpired):
                     keeper.wait(_POLL_S)
-        code = keeper.wait()
+        try:
+            code = keeper.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            keeper.kill()
+            code = keeper.wait()
+            kill_marked(order.folder)
         if code == STOPPED or not wanted.exists():
             raise UsageError(f"{order.fixture.id}: is no longer wanted")
         answer.seek(0)
@@ -282,7 +307,11 @@ def _put(folder: Path, home: Path) -> None:
     except OSError as error:
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-        shutil.rmtree(folder)
+        if load_record(home) is not None:
+            shutil.rmtree(folder)
+            return
+        shutil.rmtree(home)
+        folder.rename(home)
 
 
 def _lost(task: _Task) -> Record:

@@ -24,6 +24,9 @@ MARK = "TEAMCLONE_MATCH"
 GRACE_S = 3.0
 """From the request to end to the end."""
 
+GIVE_UP_S = 10.0
+"""From the end of the grace until one does without those that cannot be killed, stuck in the system."""
+
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 
@@ -61,11 +64,12 @@ def _die_with_parent() -> None:
 def end_all(*, grace_s: float = GRACE_S) -> None:
     """End all that was started from this process, and all that it adopted; what does not go in time is killed."""
     deadline = time.monotonic() + grace_s
+    give_up = deadline + GIVE_UP_S
     left = _descendants()
     for process in left:
         with suppress(psutil.NoSuchProcess):
             process.terminate()
-    while left:
+    while left and time.monotonic() < give_up:
         left = psutil.wait_procs(left, timeout=max(0.0, deadline - time.monotonic()))[1]
         for process in left:
             with suppress(psutil.NoSuchProcess):
@@ -95,7 +99,7 @@ def kill_marked(folder: Path) -> int:
     for process in psutil.process_iter():
         with suppress(psutil.Error, OSError):
             mark = process.environ().get(MARK)
-            if mark and Path(mark).is_relative_to(folder):
+            if mark and Path(mark).resolve().is_relative_to(folder.resolve()):
                 process.kill()
                 killed.append(process)
     psutil.wait_procs(killed, timeout=GRACE_S)

@@ -14,6 +14,7 @@ from teamclone.play.game import FailedError, who
 from teamclone.play.holes import Holes, count_holes
 from teamclone.play.plan import N_UNUMS, Fixture
 from teamclone.play.record import Fault
+from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
 
 
@@ -31,13 +32,24 @@ def read_logs(folder: Path) -> tuple[Match | None, Holes | None, str | None]:
     return match, holes, str(worst[0]) if worst else None
 
 
-def verdict(fixture: Fixture, match: Match | None, holes: Holes | None, problem: str | None) -> FailedError | None:
-    """What speaks against a match whose server ended by itself; None where nothing does."""
+def verdict(
+    fixture: Fixture, match: Match | None, holes: Holes | None, problem: str | None, *, gave_up: bool
+) -> FailedError | None:
+    """What speaks against a match whose server ended by itself; None where nothing does.
+
+    Args:
+        gave_up: the server said that it waited for clients in vain. After the end of a match that does not matter.
+    """
     if match is None or holes is None or problem:
         return FailedError(Fault.BAD_LOGS, problem or "the game log has no frame")
-    last, mode = int(match.frames["cycle"][-1]), match.frames["playmode"][-1]
-    if not match.game.complete or mode != PlayMode.TIME_OVER or last < fixture.server.cycles:
-        return FailedError(Fault.BAD_LOGS, f"the game log ends at cycle {last} of {fixture.server.cycles}")
+    last, cycles = int(match.frames["cycle"][-1]), _cycles(match)
+    if not match.game.complete or match.frames["playmode"][-1] != PlayMode.TIME_OVER or last < cycles:
+        if gave_up:
+            there = (match.players["state"][-1] & state_bits.STAND) != 0
+            silent = there & (holes.last_heard < holes.last_heard[there].max(initial=0))
+            text = "the server waited for clients that did not answer"
+            return _blame(fixture, silent, Fault.HUNG, "silent") or FailedError(Fault.HUNG, text)
+        return FailedError(Fault.BAD_LOGS, f"the game log ends at cycle {last} of {cycles}")
     # Perhaps too shortly before the end to have been seen.
     running = (match.frames["playmode"] != PlayMode.TIME_OVER)[:, None]
     gone = ((match.players["state"] == 0) & running).any(0)
@@ -47,9 +59,15 @@ def verdict(fixture: Fixture, match: Match | None, holes: Holes | None, problem:
     )
 
 
-def who_hung(fixture: Fixture, holes: Holes) -> FailedError | None:
-    """The players for whom a server waited in vain until it gave up: the others were heard longer."""
-    return _blame(fixture, holes.last_heard < holes.last_heard.max(), Fault.HUNG, "silent")
+def _cycles(match: Match) -> int:
+    """Of the regular halves, as the server counts them (`serverparam.cpp`)."""
+
+    def number(name: str, usual: float) -> float:
+        value = match.game.server_params.get(name, usual)
+        return value if isinstance(value, float) else usual
+
+    per_half = int(number("half_time", 300) * 1000 / number("simulator_step", 100) + 0.5)
+    return per_half * int(number("nr_normal_halfs", 2))
 
 
 def _blame(fixture: Fixture, flags: NDArray[np.bool_], fault: Fault, text: str) -> FailedError | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ def test_the_paper_s_options_are_the_default_and_may_be_changed(tmp_path: Path) 
     assert "server::fullstate_r=on" in words
     assert "server::synch_mode=off" in words
     assert "server::half_time=5" in words
-    assert fixture.server.cycles == 100
+    assert fixture.server.most_cycles == 100
     assert not fixture.server.synch
 
 
@@ -126,7 +127,7 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
         "pairings 2: Red against itself",
         "pairings 3: needs left and right",
         "server.options.port: is set by teamclone",
-        "server.options.half_time: expected a number, text, true or false, got [1]",
+        "server.options.half_time: expected a number, got [1]",
         "limits.connect_s: expected more than 0, got -1",
         "limits.match_s: expected a number, got 'long'",
         "play.attempts: expected at least 1, got 0",
@@ -171,3 +172,73 @@ def test_the_quick_case_tells_two_copies_of_a_team_apart(tmp_path: Path) -> None
     [fixture] = quick_plan(*folders, matches=1, server="srv", options={}).fixtures
     assert fixture.id == "team-vs-team-2-1"
     assert fixture.right.folder == folders[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"teams": {**TEAMS, "Red": {"command": " "}}}, "teams.Red: needs one of command"),
+        ({"teams": {**TEAMS, "Red": {"command": "r\0"}}}, "teams.Red: commands and variables cannot hold a NUL byte"),
+        (
+            {"teams": {**TEAMS, "Red": {"command": "r", "folder": "~nobody-of-this-name/x"}}},
+            "teams.Red.folder: ~nobody",
+        ),
+        ({"teams": {**TEAMS, "Red": {"command": "r", "environment": {"A=B": "c"}}}}, "no variable can be called 'A=B'"),
+        ({"teams": {**TEAMS, "Red": {"command": "r", "environment": {"A": "{unum}"}}}}, "environment.A: no {unum}"),
+        ({"limits": {"connect_s": math.inf}}, "limits.connect_s: expected more than 0, got inf"),
+        ({"limits": {"stall_s": 0}}, "limits.stall_s: expected more than 0, got 0"),
+        ({"server": {"options": {"half_time": "2"}}}, "server.options.half_time: expected a number, got '2'"),
+        ({"server": {"options": {"half_time": -1}}}, "server.options.half_time: expected a number, got -1"),
+        ({"server": {"options": {"wind_dir": math.inf}}}, "server.options.wind_dir: expected a number, a word"),
+        ({"server": {"options": {"landmark_file": "a b"}}}, "server.options.landmark_file: expected a number, a word"),
+        ({"server": {"options": {"game_log_version": 3}}}, "a log of version 3 does not hold enough"),
+        ({"pairings": [{"left": "Red", "right": "Blue", "matches": 10**9}]}, "more than 100000 matches"),
+        (
+            {
+                "teams": {
+                    "a": {"command": "r"},
+                    "b-vs-c": {"command": "r"},
+                    "a-vs-b": {"command": "r"},
+                    "c": {"command": "r"},
+                },
+                "pairings": [{"left": "a", "right": "b-vs-c"}, {"left": "a-vs-b", "right": "c"}],
+            },
+            "a-vs-b-vs-c-1: names two matches",
+        ),
+    ],
+)
+def test_what_would_fail_later_is_told_before(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    table = {"teams": TEAMS, "pairings": [{"left": "Red", "right": "Blue"}], **changes}
+    with pytest.raises(UsageError) as caught:
+        plan_from(table, where="plan", base=tmp_path)
+    assert words in str(caught.value)
+
+
+def test_switches_may_be_words_and_shell_variables_are_no_placeholders(tmp_path: Path) -> None:
+    teams = {**TEAMS, "Red": {"command": "sh -c 'r ${HOME} {port}'"}}
+    table = {
+        "teams": teams,
+        "pairings": [{"left": "Red", "right": "Blue"}],
+        "server": {"options": {"synch_mode": "Off"}},
+    }
+    [fixture] = plan_from(table, where="plan", base=tmp_path).fixtures
+    assert fixture.server.options["server::synch_mode"] is False
+    assert filled_in(fixture.left.clients()[0][1], {"port": 7}) == ["sh", "-c", "r ${HOME} 7"]
+
+
+def test_the_same_plan_is_the_same_wherever_it_is_called_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("plans", "elsewhere"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "plans" / "plan.toml").write_text(
+        "[teams.Red]\ncommand = 'r'\n[teams.Blue]\ncommand = 'b'\n[[pairings]]\nleft = 'Red'\nright = 'Blue'\n"
+    )
+    found = []
+    for folder, path in (("plans", "plan.toml"), ("elsewhere", "../plans/plan.toml")):
+        monkeypatch.chdir(tmp_path / folder)
+        found.append(load_plan(Path(path)).fixtures[0])
+    assert found[0] == found[1]
+
+
+def test_a_folder_without_a_start_script_is_no_team(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="has no script called start"):
+        quick_plan("red", str(tmp_path), matches=1, server="srv", options={})

@@ -11,14 +11,17 @@ import pytest
 
 from teamclone.errors import PlayError
 from teamclone.logs import read_match
+from teamclone.logs.match import Match
 from teamclone.play.holes import count_holes
 from teamclone.play.monitor import scene_of
-from teamclone.play.plan import ServerSpec
+from teamclone.play.plan import Fixture, Limits, ServerSpec, TeamSpec
 from teamclone.play.ports import DEFAULT_PORT, held_ports, is_free
 from teamclone.play.record import Fault, Record, Side, Trouble, load_record, save_record
 from teamclone.play.server import find_server, gave_up, last_words, met_taken_port, programs_of, server_report
+from teamclone.play.verdict import verdict
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.rcss.state_bits import DISCARD
 
 PLAYER = b"((%s %d) 0 %s -50 0 0 0 0 0 (v h 120) (s 8000 1 1 130600) (c 0 0 0 0 1 0 0 0 0 0 0))"
 
@@ -146,3 +149,67 @@ def test_the_programs_of_a_team_are_those_it_names_and_those_in_its_folder(tmp_p
     found = programs_of(tmp_path, [["sh", "./player.conf", "-x", "conf/formation"], ["./bin/player"]])
     assert {path.name for path in found} == {"sh", "player.conf", "formation", "player"}
     assert tmp_path / "notes" not in found
+
+
+def played(samples_dir: Path, *, frames: int | None = None) -> Match:
+    """A real match, or its beginning as a server leaves it that gave up."""
+    match = read_match(sorted(samples_dir.glob("*.rcg*"))[0])
+    if frames is None:
+        return match
+    cut = {name: column[:frames] for name, column in match.frames.items()}
+    players = {name: column[:frames].copy() for name, column in match.players.items()}
+    assert match.log is not None
+    early = match.commands["frame"] < frames
+    commands = {name: column[early] for name, column in match.log.commands.items()}
+    game, log = replace(match.game, frames=cut, players=players), replace(match.log, commands=commands)
+    return replace(match, game=game, log=log)
+
+
+def silenced(match: Match, *, side: int, unum: int, since: int) -> Match:
+    """Without what a player sent from a frame on."""
+    assert match.log is not None
+    commands = match.log.commands
+    kept = ~((commands["side"] == side) & (commands["unum"] == unum) & (commands["frame"] >= since))
+    return replace(match, log=replace(match.log, commands={name: column[kept] for name, column in commands.items()}))
+
+
+FIXTURE = Fixture(
+    id="Red-vs-Blue-1",
+    left=TeamSpec(name="Red"),
+    right=TeamSpec(name="Blue"),
+    server=ServerSpec(),
+    limits=Limits(),
+    seed=0,
+)
+
+
+def judged(match: Match, *, gave_up: bool = False) -> tuple[str, int | None, tuple[int, ...]] | None:
+    found = verdict(FIXTURE, match, count_holes(match), None, gave_up=gave_up)
+    return found and (found.fault, found.side, found.unums)
+
+
+@pytest.mark.parametrize("gave_up", [False, True])
+def test_a_match_that_was_played_to_its_end_is_one(samples_dir: Path, gave_up: bool) -> None:
+    assert judged(played(samples_dir), gave_up=gave_up) is None
+
+
+def test_a_match_that_ends_early_is_none(samples_dir: Path) -> None:
+    assert judged(played(samples_dir, frames=500)) == (Fault.BAD_LOGS, None, ())
+
+
+def test_whom_a_server_waited_for_in_vain_is_not_who_was_sent_off(samples_dir: Path) -> None:
+    match = played(samples_dir, frames=500)
+    match.players["state"][200:, 4] = DISCARD
+    match = silenced(silenced(match, side=1, unum=5, since=200), side=-1, unum=4, since=450)
+    assert judged(match, gave_up=True) == (Fault.HUNG, 1, (4,))
+
+
+def test_a_player_who_was_silent_for_long_counts_as_hung_though_the_match_ended(samples_dir: Path) -> None:
+    match = silenced(played(samples_dir), side=1, unum=7, since=1700)
+    assert judged(match) == (Fault.HUNG, 0, (7,))
+
+
+def test_a_player_who_was_gone_shortly_before_the_end_is_noticed(samples_dir: Path) -> None:
+    match = played(samples_dir)
+    match.players["state"][-3:-1, 14] = 0
+    assert judged(match) == (Fault.CRASHED, 1, (4,))

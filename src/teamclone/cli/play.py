@@ -31,7 +31,7 @@ def play(
         typer.Option("--set", metavar="KEY=VALUE", help="With --left and --right: an option of the server."),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one for two processors unless given.")
+        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one a processor unless given.")
     ] = None,
     store: Annotated[str | None, typer.Option("--ingest", help="Add each match to this store as it ends.")] = None,
     scheduler: Annotated[
@@ -124,9 +124,10 @@ def print_report(report: PlayReport) -> None:
         print(line_of(record))
     if len(failed) > SHOWN:
         print(f"and {len(failed) - SHOWN} more that failed")
+    rate = f", {3600 * report.played / report.seconds:.0f} an hour" if report.played else ""
     print(
         f"matches: {len(report.records) - len(failed)} complete, {len(failed)} failed, {report.played} played now; "
-        f"{report.seconds:.1f} s"
+        f"{report.seconds:.1f} s{rate}"
     )
 
 

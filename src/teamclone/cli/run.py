@@ -14,7 +14,7 @@ def run(
         Path, typer.Option("--out", help="Folder for all that is made; one that was begun is gone on with.")
     ],
     jobs: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one for two processors unless given.")
+        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one a processor unless given.")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Play and clean on the Dask cluster of this scheduler: tcp://host:port.")

@@ -106,7 +106,7 @@ def play(
         store: each match is added to it as it ends, and those that were there before.
         executor: where matches are played, for example on a cluster (``cluster.executor_of``); its workers must see
             ``out`` and the teams under the same paths. None plays on this machine.
-        jobs: how many at once, None for one for every two processors.
+        jobs: how many at once, None for one a processor; in real time, where it must not be busy, one for two.
         retry_failed: forget the attempts at matches that failed before.
         on_progress: told how many matches are accounted for, and how many there are.
 
@@ -146,7 +146,7 @@ def play(
         ]
         on_progress(len(records), len(plan.fixtures))
         if executor is None:
-            threads = jobs or max(1, available_cpus() // 2)
+            threads = jobs or max(1, available_cpus() // (1 if plan.fixtures[0].server.synch else 2))
             executor = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="match"))
         stop = lambda: wanted.unlink(missing_ok=True)  # noqa: E731
         stack.callback(stop)

@@ -15,14 +15,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from teamclone.models.relative import GEOMETRY
+from teamclone.models.relative import geometry_of
 from teamclone.rcss import pitch
 
 COLUMNS = 10
 """Inputs that each place gives."""
 TURN_DEG = 15.0
 """Agents of the league dash without a turn at what is closer to straight ahead."""
-_PLACE = {name: index for index, name in enumerate(GEOMETRY)}
 
 
 def layers(widths: Sequence[int], activation: type[nn.Module], dropout: float = 0.0) -> nn.Sequential:
@@ -33,11 +32,6 @@ def layers(widths: Sequence[int], activation: type[nn.Module], dropout: float = 
         if dropout:
             parts.append(nn.Dropout(dropout))
     return nn.Sequential(*parts)
-
-
-def geometry_of(geometry: Tensor, *names: str) -> list[Tensor]:
-    """Columns of GEOMETRY, (batch, 1) each."""
-    return [geometry[:, _PLACE[name], None] for name in names]
 
 
 class Aims(nn.Module):

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.models import mixture
-from teamclone.models.aims import geometry_of
 from teamclone.models.kicks import Kicks
 from teamclone.models.loss import LIMITS, Balance, Loss, ParameterLoss, mixture_loss, point_loss
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
+from teamclone.models.relative import geometry_of
 from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from teamclone.models.aims import geometry_of
 from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
 from teamclone.models.physics import covered
-from teamclone.models.relative import GEOMETRY, MATES
+from teamclone.models.relative import GEOMETRY, MATES, geometry_of
 from teamclone.rcss import pitch
 
 FREE = 3

@@ -36,6 +36,8 @@ PAST_FRAMES = 3
 NEAREST_OPPONENTS = 6
 RIVALS = 3
 MATES = 10
+FAR_M = 100.0
+"""Further than anything on the pitch; for players who are not there."""
 CLIP = 10.0
 """Standard deviations to which inputs are limited, so that nothing unheard of leads far astray."""
 NEAR_M = 1.0
@@ -57,6 +59,12 @@ ball_x, ball_y, ball_vx, ball_vy: the ball. kick_gain: speed that one unit of ki
 turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from where he rolls out to where he meets it.
 mate_0_x, ...: the team mates, the nearest first; where one is missing, the actor.
 """
+_PLACE = {name: index for index, name in enumerate(GEOMETRY)}
+
+
+def geometry_of(geometry: Tensor, *names: str) -> list[Tensor]:
+    """Columns of GEOMETRY, (batch, 1) each."""
+    return [geometry[:, _PLACE[name], None] for name in names]
 
 
 class RelativeFeatures(nn.Module):
@@ -143,7 +151,7 @@ class RelativeFeatures(nn.Module):
         free = (flags & FLAG_TACKLING) == 0
         doubt = (0.02 * (to_me + own_ball_m[:, None])).clamp(max=0.5)
         mate_has_it = (mate & free & (to_ball < areas)).any(1)
-        opponent_gap = torch.where(opponent & free, to_ball - areas - doubt, NEVER).amin(1)
+        opponent_gap = torch.where(opponent & free, to_ball - areas - doubt, FAR_M).amin(1)
         held = opponent_gap < 0
         reach = reach_ball(ball, players, types, held=held, actor=actor)
 
@@ -158,11 +166,11 @@ class RelativeFeatures(nn.Module):
         rank = (mates < own_steps[:, None]).sum(1).to(ball.dtype)
 
         # Lines.
-        defenders = torch.where(opponent, position[..., 0], -NEVER).topk(2, dim=1).values[:, 1]
+        defenders = torch.where(opponent, position[..., 0], -FAR_M).topk(2, dim=1).values[:, 1]
         next_ball = ball[:, :2] + ball[:, 2:]
         line = torch.stack([defenders, torch.zeros_like(defenders), next_ball[:, 0], meetings[3][:, 0]], 1).amax(1)
         limit = torch.maximum(line, torch.where(mates2[:, 0] < STEPS, meetings[1][:, 0], line))
-        ours = torch.where(on_field & (number < 11), position[..., 0], NEVER)
+        ours = torch.where(on_field & (number < 11), position[..., 0], FAR_M)
         last_line = torch.minimum((-(-ours).topk(2, dim=1).values)[:, 1].clamp(max=0.0), ball[:, 0])
         x = view.origin[:, 0]
 

@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from teamclone.models.aims import COLUMNS, Aims, geometry_of, layers
-from teamclone.models.relative import GEOMETRY
+from teamclone.models.aims import COLUMNS, Aims, layers
+from teamclone.models.relative import GEOMETRY, geometry_of
 
 SCALE = (0.75 * 52.5, 0.75 * 34.0)
 

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +149,7 @@ def play(
         if executor is None:
             threads = jobs or max(1, available_cpus() // (1 if plan.fixtures[0].server.synch else 2))
             executor = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="match"))
-        stop = lambda: wanted.unlink(missing_ok=True)  # noqa: E731
+        stop = partial(wanted.unlink, missing_ok=True)
         stack.callback(stop)
         for task, result in run_tasks(_play_match, tasks, executor=executor, on_stop=stop):
             record = _lost(task) if isinstance(result, Died) else result

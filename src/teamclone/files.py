@@ -1,7 +1,8 @@
-"""Writing a file in one step, and holding a file or folder against other processes."""
+"""Writing a file in one step, naming content by its hash, holding a file or folder against other processes."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sys
@@ -43,6 +44,11 @@ def _layout(value: Any, indent: str = "") -> str:
         f"{inner}{json.dumps(str(key), ensure_ascii=False)}: {_layout(item, inner)}" for key, item in value.items()
     ]
     return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def digest(data: bytes) -> str:
+    """16 hex digits that stand for the content."""
+    return hashlib.blake2b(data, digest_size=8).hexdigest()
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import itertools
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
@@ -15,18 +15,20 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.errors import PlayError, UsageError
 from teamclone.evaluation.evaluate import evaluate, save_evaluation
 from teamclone.evaluation.report import fresh_evaluation, make_report
-from teamclone.play.plan import Plan, fill, folder_of, plan_from, read_plan
+from teamclone.play.plan import Plan, folder_of, plan_from, read_plan
 from teamclone.play.play import PlayReport, play
 from teamclone.play.record import Record
 from teamclone.play.server import find_server
+from teamclone.settings import fill
 from teamclone.store import create_store
 from teamclone.training.config import Config, differences, load_config
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, is_run, open_run
 
-MAX_SHARE = 0.9
 STORE, DATASET, RUN = "store", "dataset", "run"
 """Folders of a plan's folder, beside those of `play`."""
+MAX_SHARE = 0.9
+"""Of the matches, for test or validation."""
 
 
 class Stage(StrEnum):
@@ -82,23 +84,16 @@ class StageResult:
     text: str
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """Who is told what goes on: a stage's steps, what became of matches, epochs, and what stages came to."""
+    """Who is told what goes on: the steps of a stage, what became of matches, the progress of training."""
 
     on_progress: Callable[[Stage, int, int], None] = lambda stage, done, total: None
     on_record: Callable[[Record], None] = lambda record: None
     on_training: Callable[[Progress], None] = lambda progress: None
-    on_stage: Callable[[StageResult], None] = lambda result: None
-    results: list[StageResult] = field(default_factory=list)
 
     def steps(self, stage: Stage) -> Callable[[int, int], None]:
         return lambda done, total: self.on_progress(stage, done, total)
-
-    def tell(self, stage: Stage, started: float, text: str, *, done: bool = True) -> None:
-        result = StageResult(stage=stage, done=done, seconds=time.monotonic() - started, text=text)
-        self.results.append(result)
-        self.on_stage(result)
 
 
 def load_pipeline(path: Path) -> Pipeline:
@@ -147,7 +142,7 @@ def run_pipeline(
     *,
     executor: Executor | None = None,
     jobs: int | None = None,
-    watch: Watch | None = None,
+    watch: Watch = Watch(),
 ) -> tuple[PlayReport, list[StageResult]]:
     """Do what is missing, stage by stage. Stopped or killed, the next call goes on where this one was.
 
@@ -159,9 +154,16 @@ def run_pipeline(
         PlayError: as of `play.play`, or no match at all is complete.
         TeamcloneError: of the stage that failed; what the stages before made stays.
     """
-    watch = watch or Watch()
-    out = out.resolve()
+    results: list[StageResult] = []
     started = time.monotonic()
+
+    def tell(stage: Stage, text: str, *, done: bool) -> None:
+        nonlocal started
+        now = time.monotonic()
+        results.append(StageResult(stage=stage, done=done, seconds=now - started, text=text))
+        started = now
+
+    out = out.resolve()
     if executor is None:
         find_server(pipeline.plan.fixtures[0].server)  # before anything is made
     store = create_store(pipeline.store or str(out / STORE))
@@ -176,13 +178,13 @@ def run_pipeline(
     )
     complete = len(report.records) - len(report.failed)
     text = f"{complete} matches in {store.location}, {len(report.failed)} failed"
-    watch.tell(Stage.PLAY, started, text, done=report.played > 0)
+    tell(Stage.PLAY, text, done=report.played > 0)
     if not complete:
         raise PlayError(f"{out}: no match of the plan is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]
     if pipeline.dataset is None:
-        return report, watch.results
+        return report, results
 
-    started, folder = time.monotonic(), out / DATASET
+    folder = out / DATASET
     current = is_current(folder, pipeline.dataset, store)
     if not current:
         build_dataset(
@@ -196,28 +198,26 @@ def run_pipeline(
         )
     dataset = open_dataset(folder)
     text = f"{dataset.meta['n_samples']:,} samples in {folder}"
-    watch.tell(Stage.DATASET, started, text, done=not current)
+    tell(Stage.DATASET, text, done=not current)
     if pipeline.train is None:
-        return report, watch.results
+        return report, results
 
-    started = time.monotonic()
     run, trained = _train(pipeline.train, folder, out / RUN, watch)
-    watch.tell(Stage.TRAIN, started, f"{len(run.history())} epochs in {run.path}", done=trained)
+    tell(Stage.TRAIN, f"{len(run.history())} epochs in {run.path}", done=trained)
 
-    started = time.monotonic()
     evaluation = fresh_evaluation(run)
     fresh = evaluation is not None and evaluation["run"]["checkpoint"] == pipeline.checkpoint
     if not fresh:
         steps = watch.steps(Stage.EVALUATE)
         save_evaluation(run, evaluate(run, checkpoint=pipeline.checkpoint, on_progress=steps))
-    watch.tell(Stage.EVALUATE, started, f"{run.path}/evaluation.json", done=not fresh)
+    tell(Stage.EVALUATE, f"{run.path}/evaluation.json", done=not fresh)
 
-    started, page = time.monotonic(), run.path / "report.html"
+    page = run.path / "report.html"
     there = fresh and page.exists() and page.stat().st_mtime_ns >= (run.path / "evaluation.json").stat().st_mtime_ns
     if not there:
         make_report(run, on_progress=lambda _, done, total: watch.on_progress(Stage.REPORT, done, total))
-    watch.tell(Stage.REPORT, started, str(page), done=not there)
-    return report, watch.results
+    tell(Stage.REPORT, str(page), done=not there)
+    return report, results
 
 
 def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> tuple[Run, bool]:

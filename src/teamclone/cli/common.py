@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-import tomllib
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from typing import Any, NoReturn, TypeVar
@@ -15,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from teamclone.errors import UsageError
+from teamclone.settings import value_of
 
 E = TypeVar("E", bound=StrEnum)
 
@@ -69,16 +69,13 @@ def progress(what: str) -> Progress:
 
 
 def values_of(settings: Iterable[str]) -> dict[str, Any]:
-    """``KEY=VALUE`` texts, the value as TOML writes it; on and off as the server says, anything else is a word."""
+    """``KEY=VALUE`` texts, see `settings.value_of`."""
     values: dict[str, Any] = {}
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals:
             raise UsageError(f"--set: expected KEY=VALUE, got {setting!r}")
-        try:
-            values[key.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[key.strip()] = {"on": True, "off": False}.get(text.strip(), text.strip())
+        values[key.strip()] = value_of(text.strip())
     return values
 
 

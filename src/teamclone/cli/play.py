@@ -13,13 +13,12 @@ if TYPE_CHECKING:
 
 SHOWN = 20
 """Failed matches that are listed."""
+COUNTS = ("holes", "clashes", "missed")
 
 
 def play(
+    out: Annotated[Path, typer.Option("--out", help="Folder for the matches; one that was begun is gone on with.")],
     plan: Annotated[Path | None, typer.Argument(help="Plan (TOML): teams, pairings, options of the server.")] = None,
-    out: Annotated[
-        Path, typer.Option("--out", help="Folder for the matches; one that was begun is gone on with.")
-    ] = ...,  # type: ignore[assignment]
     left: Annotated[
         str | None, typer.Option(help="Instead of a plan: command that starts a team, or folder with a start script.")
     ] = None,
@@ -129,9 +128,6 @@ def print_report(report: PlayReport) -> None:
         f"matches: {len(report.records) - len(failed)} complete, {len(failed)} failed, {report.played} played now; "
         f"{report.seconds:.1f} s{rate}"
     )
-
-
-COUNTS = ("holes", "clashes", "missed")
 
 
 def _per_match(total: float, matches: list[Record]) -> str:

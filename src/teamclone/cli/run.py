@@ -24,9 +24,9 @@ def run(
     """Play, store, make the dataset, train, evaluate and report, as one plan says. What is there already is kept."""
     from teamclone.cli.common import print_json, print_table, progress
     from teamclone.cli.play import line_of
+    from teamclone.cli.train import reporter
     from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
     from teamclone.store.cluster import executor_of
-    from teamclone.training.loop import Progress
 
     asked = load_pipeline(plan)
     with executor_of(scheduler, jobs=jobs) as executor, progress("run") as bar:
@@ -35,9 +35,6 @@ def run(
         def show(stage: Stage, done: int, total: int) -> None:
             bar.update(task, description=stage, completed=done, total=total)
 
-        def show_training(at: Progress) -> None:
-            show(Stage.TRAIN, max(0, at.epoch - 1) * at.batches + at.batch, at.epochs * at.batches)
-
         report, stages = run_pipeline(
             asked,
             out,
@@ -45,7 +42,7 @@ def run(
             jobs=jobs,
             watch=Watch(
                 on_progress=show,
-                on_training=show_training,
+                on_training=reporter(bar, task),
                 on_record=lambda record: bar.console.print(
                     line_of(record), markup=False, highlight=False, soft_wrap=True
                 ),

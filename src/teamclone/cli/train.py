@@ -15,6 +15,9 @@ from teamclone.errors import TeamcloneError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rich.progress import Progress as Bar
+    from rich.progress import TaskID
+
     from teamclone.training.config import Config
     from teamclone.training.loop import Progress
     from teamclone.training.run import Base, Run
@@ -72,7 +75,7 @@ def run_training(
             _in_silence(lambda: loop.train(config, opened, out, resume=resume, base=base))
             return
         with progress("train" if base is None else "adapt") as bar:
-            report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines()
+            report = reporter(bar, bar.add_task("", total=None))
             run = loop.train(config, opened, out, resume=resume, base=base, on_progress=report)
     except KeyboardInterrupt:
         finished = len(open_run(out).history()) if is_run(out) else 0
@@ -91,7 +94,12 @@ def _in_silence(work: Callable[[], object]) -> None:
         raise typer.Exit(130) from None
 
 
-def _bar(task: int, update: Callable[..., None]) -> Callable[[Progress], None]:
+def reporter(bar: Bar, task: TaskID) -> Callable[[Progress], None]:
+    """Shows the progress of a training: on the bar, or as lines where there is no terminal."""
+    return _lines() if bar.disable else _bar(task, bar.update)
+
+
+def _bar(task: TaskID, update: Callable[..., None]) -> Callable[[Progress], None]:
     """Progress as a bar, one step a batch."""
     text = ""
 

@@ -51,15 +51,11 @@ def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
     return slot
 
 
-def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
-    """Indices of the commands that take the body slot: the first of each frame and player (rcss.md 3.2).
+def body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
+    """Indices of the players' commands that would take a body slot of their frame if it were free, in log order.
 
-    A ``move`` during play_on leaves the slot free, an invalid command never takes it.
-
-    Args:
-        commands: with ``frame``, ``side``, ``unum``, ``kind``, ``valid``, in log order.
-        playmode: (n_frames,) of the match.
-        play_on: id of the play mode in which ``move`` is not allowed.
+    A ``move`` during play_on leaves the slot free, an invalid command never takes it. Arguments as of
+    ``first_body_commands``.
     """
     body = _IS_BODY.take(commands["kind"])
     body &= commands["valid"]
@@ -67,7 +63,19 @@ def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_
     body &= commands["unum"] > 0
     index = np.flatnonzero(body)
     mode = playmode[commands["frame"][index]]
-    index = index[~((commands["kind"][index] == CommandKind.MOVE) & (mode == play_on))]
+    taking: NDArray[np.int64] = index[~((commands["kind"][index] == CommandKind.MOVE) & (mode == play_on))]
+    return taking
+
+
+def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
+    """Indices of the commands that take the body slot: the first of each frame and player (rcss.md 3.2).
+
+    Args:
+        commands: with ``frame``, ``side``, ``unum``, ``kind``, ``valid``, in log order.
+        playmode: (n_frames,) of the match.
+        play_on: id of the play mode in which ``move`` is not allowed.
+    """
+    index = body_commands(commands, playmode, play_on=play_on)
     slot = slot_of(commands["side"][index], commands["unum"][index])
     key = commands["frame"][index].astype(np.int64) * N_PLAYERS + slot
     first = np.full(len(playmode) * N_PLAYERS, -1, np.int64)

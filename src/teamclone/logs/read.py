@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Iterable
@@ -13,6 +12,7 @@ from typing import BinaryIO
 import numpy as np
 
 from teamclone.errors import LogError, UsageError
+from teamclone.files import digest
 from teamclone.logs.align import executed_kind, first_body_commands, follows, frame_of, slot_of
 from teamclone.logs.columns import FRAMES, PLAYERS
 from teamclone.logs.match import (
@@ -229,7 +229,7 @@ def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Ma
         raise AssertionError("a match has a game log or a command log")
     own = tuple(problems) + game.problems + (log.problems if log else ()) + tuple(_oddities(game, rcg))
     return Match(
-        match_id=hashlib.blake2b(named.data, digest_size=8).hexdigest(),
+        match_id=digest(named.data),
         rcg_path=rcg.path if rcg else None,
         rcl_path=rcl.path if rcl and log else None,
         game=game,

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.logs.align import slot_of
+from teamclone.logs.align import body_commands, slot_of
 from teamclone.logs.match import N_PLAYERS, Match
 from teamclone.rcss import state_bits
-from teamclone.rcss.commands import BODY_KINDS, CommandKind
 from teamclone.rcss.playmodes import PlayMode
 
 _FROZEN = state_bits.TACKLE | state_bits.FOUL_CHARGED
@@ -42,17 +41,14 @@ def count_holes(match: Match) -> Holes:
     commands, cycle = match.commands, match.frames["cycle"]
     n_frames = len(cycle)
     slot = slot_of(commands["side"], commands["unum"])
-    bound = (commands["frame"] >= 0) & (slot >= 0)
     place = commands["frame"].astype(np.int64) * N_PLAYERS + slot
 
-    def per_frame(chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-        return np.bincount(place[bound & chosen], minlength=n_frames * N_PLAYERS).reshape(n_frames, N_PLAYERS)
+    def per_frame(index: NDArray[np.int64]) -> NDArray[np.int64]:
+        return np.bincount(place[index], minlength=n_frames * N_PLAYERS).reshape(n_frames, N_PLAYERS)
 
     mode = match.frames["playmode"]
-    moves = commands["kind"] == CommandKind.MOVE
-    ignored = moves & (mode[commands["frame"]] == PlayMode.PLAY_ON) if n_frames else moves
-    body = per_frame(np.isin(commands["kind"], list(BODY_KINDS)) & commands["valid"] & ~ignored)
-    heard = per_frame(np.ones(len(slot), np.bool_)) > 0
+    body = per_frame(body_commands(commands, mode, play_on=PlayMode.PLAY_ON))
+    heard = per_frame(np.flatnonzero((commands["frame"] >= 0) & (slot >= 0))) > 0
     state = match.players["state"]
     free = ((state & state_bits.STAND) != 0) & ((state & _FROZEN) == 0)
     free &= ((mode != PlayMode.TIME_OVER) & (mode != PlayMode.BEFORE_KICK_OFF))[:, None]

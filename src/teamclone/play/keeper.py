@@ -46,7 +46,12 @@ class Order:
     attempt: int
 
     def to_json(self) -> dict[str, Any]:
-        return {**dataclasses.asdict(self), "folder": str(self.folder), "server": str(self.server)}
+        return {
+            "fixture": self.fixture.to_json(),
+            "folder": str(self.folder),
+            "server": str(self.server),
+            "attempt": self.attempt,
+        }
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 import math
 import os
@@ -12,12 +11,13 @@ import shlex
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields
-from enum import StrEnum
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from teamclone.errors import UsageError, choose
+from teamclone.files import digest
+from teamclone.settings import entries, fill
 
 N_UNUMS = 11
 COACH = 12
@@ -47,12 +47,13 @@ OURS = (
 OTHER_SECTIONS = ("store", "dataset", "train", "evaluate")
 """Sections of a plan that are for `teamclone run`, see `pipeline`."""
 
+MAX_FIXTURES = 100_000
+
 _PLACEHOLDER = re.compile(r"(?<!\$)\{(\w*)\}")  # ${NAME} is for a shell
 _VARIABLE = re.compile(r"[A-Za-z_]\w*")
 _WORD = re.compile(r"[\w./+-]*")
 """What the server's parser takes as the value of an option."""
 _NUMBERS = ("half_time", "nr_normal_halfs", "extra_half_time", "nr_extra_halfs", "simulator_step")
-MAX_FIXTURES = 100_000
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
 
@@ -175,7 +176,7 @@ class Fixture:
     def fingerprint(self) -> str:
         """Says whether two fixtures ask for the same match; limits do not count."""
         asked = [dataclasses.asdict(part) for part in (self.left, self.right, self.server)]
-        return hashlib.blake2b(json.dumps([asked, self.seed], sort_keys=True).encode(), digest_size=8).hexdigest()
+        return digest(json.dumps([asked, self.seed], sort_keys=True).encode())
 
     def to_json(self) -> dict[str, Any]:
         return dataclasses.asdict(self)
@@ -246,8 +247,7 @@ def quick_plan(left: str, right: str, *, matches: int, server: str, options: Map
     """
     teams = {}
     for side, text in (("left", left), ("right", right)):
-        problems: list[str] = []
-        folder = Path(_path(text, Path.cwd(), f"--{side}", problems))
+        folder = Path(os.path.abspath(os.path.expanduser(text)))  # noqa: PTH100, PTH111 (any text)
         is_folder = os.path.isdir(folder)  # noqa: PTH112 (any text)
         script = folder / "start" if is_folder else folder
         if is_folder and not script.is_file():
@@ -282,7 +282,7 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
     program = _path(given.command, base, "server.command", problems) if "/" in given.command else given.command
     server = dataclasses.replace(given, command=program, options=_options(given.options, problems))
     teams: dict[str, TeamSpec] = {}
-    for name, values in _entries(table.get("teams", {}), "teams", dict, problems).items():
+    for name, values in entries(table.get("teams", {}), "teams", dict, problems).items():
         team = fill(TeamSpec, {"name": name, **values}, f"teams.{name}", problems)
         folder = _path(team.folder, base, f"teams.{name}.folder", problems)
         teams[name] = dataclasses.replace(team, folder=folder)
@@ -350,57 +350,6 @@ def option_words(options: Mapping[str, Any]) -> Iterator[str]:
 def filled_in(words: list[str], values: Mapping[str, Any]) -> list[str]:
     """The words of a command with its placeholders replaced."""
     return [_PLACEHOLDER.sub(lambda found: str(values[found[1]]), word) for word in words]
-
-
-def fill(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any:
-    """A dataclass from a TOML table; what does not fit is left out and told."""
-    if not isinstance(table, dict):
-        problems.append(f"{key}: expected a table, got {table!r}")
-        table = {}
-    hints = get_type_hints(cls)
-    kept: dict[str, Any] = {}
-    for name, value in table.items():
-        if name not in hints:
-            problems.append(f"no setting {key}.{name}; {choose(name, list(hints))}")
-        elif hints[name] is float and type(value) is int:
-            kept[name] = float(value)
-        elif hints[name] == tuple[str, ...]:
-            several = [value] if isinstance(value, str) else value
-            if isinstance(several, list) and all(isinstance(word, str) for word in several):
-                kept[name] = tuple(several)
-            else:
-                problems.append(f"{key}.{name}: expected a word or a list of words, got {value!r}")
-        elif isinstance(hints[name], type) and issubclass(hints[name], StrEnum):
-            choices = [member.value for member in hints[name]]
-            if value in choices:
-                kept[name] = hints[name](value)
-            else:
-                problems.append(f"{key}.{name}: no {value!r}; choose from {', '.join(choices)}")
-        elif hints[name] == dict[str, str]:
-            kept[name] = _entries(value, f"{key}.{name}", str, problems)
-        elif hints[name] == dict[str, Any]:
-            kept[name] = _entries(value, f"{key}.{name}", object, problems)
-        elif type(value) is hints[name]:
-            kept[name] = value
-        else:
-            kinds = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
-            problems.append(f"{key}.{name}: expected {kinds[hints[name]]}, got {value!r}")
-    needed = {item.name for item in fields(cls) if item.default is MISSING and item.default_factory is MISSING}
-    return cls(**dict.fromkeys(needed - kept.keys(), ()), **kept)
-
-
-def _entries(table: Any, key: str, kind: type, problems: list[str]) -> dict[str, Any]:
-    """A table whose names are free."""
-    if not isinstance(table, dict):
-        problems.append(f"{key}: expected a table, got {table!r}")
-        return {}
-    words = {str: "a text", dict: "a table", object: "a value"}
-    problems += [
-        f"{key}.{name}: expected {words[kind]}, got {value!r}"
-        for name, value in table.items()
-        if not isinstance(value, kind)
-    ]
-    return {name: value for name, value in table.items() if isinstance(value, kind)}
 
 
 def _wrong(team: TeamSpec) -> list[str]:

@@ -93,14 +93,13 @@ def _descendants() -> list[psutil.Process]:
     return alive
 
 
-def kill_marked(folder: Path) -> int:
-    """Kill the processes of matches played in or under a folder whose keeper is gone; how many there were."""
-    killed = []
+def kill_marked(folder: Path) -> None:
+    """Kill the processes of matches played in or under a folder whose keeper is gone."""
+    folder, killed = folder.resolve(), []
     for process in psutil.process_iter():
         with suppress(psutil.Error, OSError):
             mark = process.environ().get(MARK)
-            if mark and Path(mark).resolve().is_relative_to(folder.resolve()):
+            if mark and Path(mark).resolve().is_relative_to(folder):
                 process.kill()
                 killed.append(process)
     psutil.wait_procs(killed, timeout=GRACE_S)
-    return len(killed)

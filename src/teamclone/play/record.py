@@ -53,9 +53,6 @@ class Trouble:
     unums: tuple[int, ...] = ()
     cycle: int | None = None
 
-    def to_json(self) -> dict[str, Any]:
-        return dataclasses.asdict(self)
-
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
         return cls(**{**values, "fault": Fault(values["fault"]), "unums": tuple(values["unums"])})

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from teamclone.errors import LogError, TeamcloneError, UsageError
+from teamclone.files import digest
 from teamclone.logs import LogPair, Severity, find_matches, read_pair
 from teamclone.logs.match import Match
-from teamclone.store.status import FileStatus, Outcome, digest, stamp
+from teamclone.store.status import FileStatus, Outcome, stamp
 from teamclone.store.store import Added, Store
 from teamclone.store.workers import DIED, Died, SharedStore, run_tasks
 

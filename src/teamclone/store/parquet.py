@@ -21,13 +21,13 @@ import pyarrow.parquet as pq
 
 from teamclone import __version__
 from teamclone.errors import StoreError, UsageError
-from teamclone.files import held, write_atomic
+from teamclone.files import digest, held, write_atomic
 from teamclone.logs.columns import COUNTERS, counter_name
 from teamclone.logs.match import Columns, Match
 from teamclone.store import convert, schema
 from teamclone.store.convert import Sources, Tables
 from teamclone.store.schema import Table
-from teamclone.store.status import FileStatus, digest
+from teamclone.store.status import FileStatus
 from teamclone.store.store import Added, Rows
 
 KIND = "teamclone store"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Self
+
+from teamclone.files import digest
 
 
 class Outcome(StrEnum):
@@ -69,8 +70,3 @@ def stamp(path: Path) -> tuple[int, int]:
     except OSError:
         return -1, 0
     return found.st_size, found.st_mtime_ns
-
-
-def digest(data: bytes) -> str:
-    """16 hex digits that stand for the content."""
-    return hashlib.blake2b(data, digest_size=8).hexdigest()

@@ -12,6 +12,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from teamclone.errors import UsageError, choose
 from teamclone.models.config import ACTIVATIONS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
 from teamclone.rcss.player_types import GROUPS
+from teamclone.settings import value_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,7 +184,7 @@ def override(config: Config, overrides: Sequence[str]) -> Config:
         elif name not in table.get(section, {}):
             errors.append(f"no setting {key.strip()!r}; {_choose(key.strip(), list(_keys(table)))}")
         else:
-            table[section][name] = _value(value.strip())
+            table[section][name] = value_of(value.strip())
     return config_from(table, where="--set", errors=errors)
 
 
@@ -299,20 +300,12 @@ def _choose(wrong: str, choices: list[str]) -> str:
     return f"did you mean {' or '.join(same)}?" if same else choose(wrong, choices)
 
 
-def _value(text: str) -> Any:
-    """A value as TOML writes it; anything else is a word."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
-
-
 def _converted(key: str, value: Any, hint: Any) -> Any:
     """The value as its setting's type, within its bounds."""
     if get_origin(hint) is tuple:
         item = get_args(hint)[0]
         if isinstance(value, str):  # --set model.all_types=kick,stamina
-            value = [_value(part.strip()) for part in value.split(",") if part.strip()]
+            value = [value_of(part.strip()) for part in value.split(",") if part.strip()]
         values = value if isinstance(value, list) else [value]
         converted = tuple(_scalar(key, part, item) for part in values)
         if key == "train.betas" and not (len(converted) == 2 and all(0 <= beta < 1 for beta in converted)):

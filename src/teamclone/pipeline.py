@@ -110,7 +110,7 @@ def load_pipeline(path: Path) -> Pipeline:
     evaluation = fill(EvaluateSettings, table.get("evaluate", {}), "evaluate", problems)
     config = None
     if "dataset" in table:
-        config = fill(DatasetConfig, {"teams": [], **table["dataset"]}, "dataset", problems)
+        config = fill(DatasetConfig, table["dataset"], "dataset", problems)
         if not config.teams:
             problems.append("dataset.teams: name the team to clone")
         shares = {"test": config.test, "validation": config.validation}

@@ -396,6 +396,8 @@ def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_p
         ("[dataset]\ntest = 2.0\nsplit = 'row'\n", "dataset.split: no 'row'; choose from match, rows"),
         ("[dataset]\ntest = 2.0\n", "dataset.teams: name the team to clone"),
         ("[train]\npreset = 'small'\n", "[train] needs [dataset]"),
+        ("[[dataset]]\nteams = 'Red'\n", "dataset: expected a table"),
+        ("[teams.Green]\nname = 'Red'\ncommand = 'r'\n", "teams.Green.name: a team is called"),
         ("[dataset]\nteams = 'Red'\n[train]\nset = ['train.epoch=1']\n", "did you mean train.epochs"),
         ("[store]\nplace = 'x'\n", "no setting store.place"),
     ):

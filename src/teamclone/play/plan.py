@@ -283,7 +283,9 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
     server = dataclasses.replace(given, command=program, options=_options(given.options, problems))
     teams: dict[str, TeamSpec] = {}
     for name, values in entries(table.get("teams", {}), "teams", dict, problems).items():
-        team = fill(TeamSpec, {"name": name, **values}, f"teams.{name}", problems)
+        if "name" in values:
+            problems.append(f"teams.{name}.name: a team is called as its table is; leave it out")
+        team = fill(TeamSpec, {**values, "name": name}, f"teams.{name}", problems)
         folder = _path(team.folder, base, f"teams.{name}.folder", problems)
         teams[name] = dataclasses.replace(team, folder=folder)
         problems += [f"teams.{name}: {problem}" for problem in _wrong(teams[name])]

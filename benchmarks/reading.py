@@ -5,7 +5,8 @@
 MATCHES is a folder of logs. Each stage works on the largest match packed with gzip (else on the largest of all), on one
 core, warm. Times are processor seconds, which a busy machine disturbs less than those of the clock; both are printed.
 References: inflating the files with zlib and with ISA-L, and a reader in plain Python, one regular expression a player
-and a command, whose numbers are checked against ours.
+and a command, whose numbers are checked against ours. `rcg2txt` of librcsc, the league's C++ library, is measured, too,
+where it is on the PATH; it reads the game log and prints part of it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import argparse
 import lzma
 import os
 import re
+import shutil
 import statistics
 import subprocess
 import sys
@@ -26,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from measure import cost_of
 
 from teamclone.cli.common import print_table
 from teamclone.logs import LogPair, Match, find_matches, read_pair
@@ -222,6 +225,9 @@ def main() -> None:
         title=f"{packed.path.name}: {len(game) / 1e6:.1f} MB + {len(log) / 1e6:.1f} MB, median of {options.runs} runs",
         numeric=range(1, 7),
     )
+    if tool := shutil.which("rcg2txt"):
+        took = statistics.median(cost_of(tool, rcg).cpu for _ in range(options.runs))
+        print(f"rcg2txt of librcsc: {took * 1e3:.0f} ms of cpu for the rcg, {took / ours['rcg'].cpu:.1f} x ours")
 
     rows = []
     with tempfile.TemporaryDirectory() as cache:

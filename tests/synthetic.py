@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, FLAG_GOALIE, FLAG_ON_FIELD, STEPS, Split
+from teamclone.dataset.layout import CODE, DETAIL, DETAIL_CHANNELS, FLAG_GOALIE, FLAG_ON_FIELD, STEPS, Split
 from teamclone.dataset.write import write_dataset
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.rcss.player_types import DEFAULTS, FIELDS, GROUPS, RANGES
 
 N_TYPES = 18
-DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
 
 
 def make_dataset(folder: Path, *, frames_per_match: int = 300, seed: int = 0, **changes: Any) -> Path:
@@ -42,6 +41,7 @@ def make_dataset(folder: Path, *, frames_per_match: int = 300, seed: int = 0, **
         "last_command": rng.choice([int(kind) for kind in (0, *CLONED_KINDS, CommandKind.CATCH)], (n, 22)),
     }
     detail = np.stack([np.rint(values[channel.name] / channel.step) for channel in DETAIL_CHANNELS], -1)
+    code = np.stack([values[name] for name in CODE], -1)
 
     frame = np.repeat(np.arange(n), 10)
     player = np.tile(np.arange(1, 11), n)
@@ -63,6 +63,7 @@ def make_dataset(folder: Path, *, frames_per_match: int = 300, seed: int = 0, **
         "ball": ball,
         "position": position,
         "detail": detail,
+        "code": code,
     }
     samples = {
         "frame": frame,

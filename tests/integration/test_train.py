@@ -14,7 +14,7 @@ import torch
 from safetensors.torch import load_file
 from tests.synthetic import make_dataset
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
+from teamclone.dataset.layout import DETAIL, MISSING, Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.models.network import Clone
@@ -418,7 +418,7 @@ def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, cha
     detail, ball = (dataset.frames[name].numpy().copy() for name in ("detail", "ball"))
     frame = 7 + 50 * match
     if channel == "vx":
-        detail[frame, :, [entry.name for entry in DETAIL_CHANNELS].index("vx")] = MISSING
+        detail[frame, :, DETAIL["vx"]] = MISSING
     else:
         ball[frame, 2] = np.nan
     changes = {"frames/detail": detail, "frames/ball": ball}

@@ -242,9 +242,7 @@ def _frames(frames: Columns, players: Columns, kept: NDArray[np.int64], *, side:
 
     ball = np.stack([frames[name][kept] for name in ("ball_x", "ball_y", "ball_vx", "ball_vy")], axis=-1)
     position = np.stack([seen("x"), seen("y")], axis=-1)
-    channels = {channel.name: None for channel in layout.DETAIL_CHANNELS}
-    detail: dict[str, NDArray[Any]] = {name: seen(name) for name in channels if name in players}
-    detail["vx"], detail["vy"] = seen("vx"), seen("vy")
+    detail: dict[str, NDArray[Any]] = {name: seen(name) for name in layout.PLAYER_CHANNELS if name in players}
     if turned:
         ball, position = rotate_point(ball), rotate_point(position)
         detail["vx"], detail["vy"] = rotate_point(detail["vx"]), rotate_point(detail["vy"])
@@ -267,6 +265,7 @@ def _frames(frames: Columns, players: Columns, kept: NDArray[np.int64], *, side:
         "detail": np.stack(
             [_stored(detail[channel.name], channel.step) for channel in layout.DETAIL_CHANNELS], axis=-1
         ),
+        "code": np.stack([_code(detail[name]) for name in layout.CODE], axis=-1),
     }
 
 
@@ -275,3 +274,9 @@ def _stored(values: NDArray[Any], step: float) -> NDArray[np.int16]:
     scaled = np.rint(values.astype(np.float64) / step)
     limited = np.clip(scaled, layout.MISSING + 1, 32767)
     return np.where(np.isnan(scaled), layout.MISSING, limited).astype(np.int16)
+
+
+def _code(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """A channel as uint8; NaN and what no code can be become layout.NO_CODE."""
+    known = (values >= 0) & (values < layout.NO_CODE)
+    return np.where(known, values, layout.NO_CODE).astype(np.uint8)

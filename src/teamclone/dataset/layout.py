@@ -15,7 +15,7 @@ from enum import IntEnum
 
 import numpy as np
 
-FORMAT = 1
+FORMAT = 2
 """Raised whenever a reader of the old layout would misread the new one."""
 
 
@@ -62,16 +62,30 @@ DETAIL_CHANNELS = (
     Channel(name="effort", step=1e-4, unit="", about="dash efficiency"),
     Channel(name="recovery", step=1e-4, unit="", about="stamina recovery rate"),
     Channel(name="capacity", step=4.0, unit="stamina", about="stamina left to recover"),
-    Channel(name="type", step=1.0, unit="", about="heterogeneous player type"),
-    Channel(name="flags", step=1.0, unit="", about="bit mask of FLAG_*"),
-    Channel(
+)
+"""What is measured of each player beside his position."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Code:
+    """One channel of ``code``: stored as uint8; not-a-number is stored as 255."""
+
+    name: str
+    about: str
+
+
+NO_CODE = 255
+"""A code that the log does not hold."""
+
+CODE_CHANNELS = (
+    Code(name="type", about="heterogeneous player type"),
+    Code(name="flags", about="bit mask of FLAG_*"),
+    Code(
         name="last_command",
-        step=1.0,
-        unit="",
         about="command kind id that the server executed between the previous frame and this one; 0 none",
     ),
 )
-"""What is known of each player beside his position."""
+"""What is counted or named of each player."""
 
 FLAG_ON_FIELD = 1
 FLAG_GOALIE = 2
@@ -91,6 +105,7 @@ FRAME_ARRAYS = (
     Array(name="ball", dtype="float32", shape=(4,), about="x, y in m, vx, vy in m/cycle"),
     Array(name="position", dtype="float32", shape=(22, 2), about="x, y of every player in m"),
     Array(name="detail", dtype="int16", shape=(22, len(DETAIL_CHANNELS)), about="DETAIL_CHANNELS of every player"),
+    Array(name="code", dtype="uint8", shape=(22, len(CODE_CHANNELS)), about="CODE_CHANNELS of every player"),
 )
 
 SAMPLE_ARRAYS = (
@@ -108,8 +123,10 @@ SAMPLE_ARRAYS = (
     Array(name="split", dtype="uint8", shape=(), about="Split"),
 )
 
-PLAYER_CHANNELS = ("x", "y", *(channel.name for channel in DETAIL_CHANNELS))
-"""The channels of ``State.players``, in SI units and degrees: position, then DETAIL_CHANNELS."""
+DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
+CODE = {channel.name: index for index, channel in enumerate(CODE_CHANNELS)}
+PLAYER_CHANNELS = ("x", "y", *DETAIL, *CODE)
+"""The channels of ``State.players``, in SI units and degrees: position, then DETAIL_CHANNELS, then CODE_CHANNELS."""
 
 STEPS = np.array([channel.step for channel in DETAIL_CHANNELS], np.float32)
 

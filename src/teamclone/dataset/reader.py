@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from teamclone.dataset.layout import (
-    DETAIL_CHANNELS,
+    CODE,
+    DETAIL,
     FORMAT,
     FRAME_ARRAYS,
     MISSING,
+    NO_CODE,
     PLAYER_CHANNELS,
     SAMPLE_ARRAYS,
     STEPS,
@@ -34,7 +36,6 @@ from teamclone.rcss.player_types import FIELDS
 Rows = NDArray[np.int64] | Tensor
 """Indices of samples, (batch,) int64."""
 
-_DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
 _CLASS_OF_KIND = torch.full((max(CommandKind) + 1,), -1, dtype=torch.int64)
 _CLASS_OF_KIND[torch.tensor(CLONED_KINDS)] = torch.arange(len(CLONED_KINDS))
 
@@ -103,7 +104,7 @@ class Dataset:
         frame = self.samples["frame"].index_select(0, rows).long()
         players = self._players(frame)
         n_types = self.player_types.shape[1]
-        kinds = players[..., len(PLAYER_CHANNELS) - len(DETAIL_CHANNELS) + _DETAIL["type"]].long()
+        kinds = players[..., PLAYER_CHANNELS.index("type")].long()
         place = self.frames["match"].index_select(0, frame)[:, None] * n_types + kinds
         types = self.player_types.reshape(-1, len(FIELDS)).index_select(0, place.reshape(-1))
         back = torch.arange(1, history + 1, device=rows.device)
@@ -125,11 +126,14 @@ class Dataset:
 
     def _players(self, frame: Tensor) -> Tensor:
         """(frames, 22, len(PLAYER_CHANNELS)) of some frames."""
-        detail = self.frames["detail"].index_select(0, frame)
+        detail, code = (self.frames[name].index_select(0, frame) for name in ("detail", "code"))
         players = torch.empty(len(frame), 22, len(PLAYER_CHANNELS), device=frame.device)
         players[..., :2] = self.frames["position"].index_select(0, frame)
-        torch.mul(detail, _steps(frame.device), out=players[..., 2:])
-        players[..., 2:].masked_fill_(detail == MISSING, math.nan)
+        measured, coded = players[..., 2 : 2 + len(DETAIL)], players[..., 2 + len(DETAIL) :]
+        torch.mul(detail, _steps(frame.device), out=measured)
+        measured.masked_fill_(detail == MISSING, math.nan)
+        coded[...] = code
+        coded.masked_fill_(code == NO_CODE, math.nan)
         return players
 
     def target(self, rows: Rows) -> Target:
@@ -145,8 +149,8 @@ class Dataset:
         rows = torch.as_tensor(rows)
         frame = self.samples["frame"].index_select(0, rows)
         actor = self.samples["player"].index_select(0, rows)
-        kind = self.frames["detail"][frame.long(), actor.long(), _DETAIL["last_command"]].long()
-        return torch.where(kind == MISSING, -1, _CLASS_OF_KIND[kind.clamp(min=0)])
+        kind = self.frames["code"][frame.long(), actor.long(), CODE["last_command"]].long()
+        return torch.where(kind == NO_CODE, -1, _CLASS_OF_KIND[kind.clamp(max=max(CommandKind))])
 
     def match(self, rows: Rows) -> Tensor:
         """(batch,) int64: index of each sample's match in `matches`."""

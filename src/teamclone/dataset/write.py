@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
+from teamclone.dataset.layout import CODE, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
 from teamclone.errors import DatasetError
 from teamclone.files import held
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.rcss.player_types import FIELDS
 
-_TYPE = [channel.name for channel in DETAIL_CHANNELS].index("type")
 _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
 
 
@@ -64,7 +63,7 @@ class DatasetWriter:
                 self._files[table, name].append(values)
         for name, values in (
             ("frames/match", frames["match"]),
-            ("frames/detail type", frames["detail"][..., _TYPE]),
+            ("frames/code type", frames["code"][..., CODE["type"]]),
             ("samples/frame", samples["frame"]),
             ("samples/player", samples["player"]),
             ("samples/kind", samples["kind"]),
@@ -119,7 +118,7 @@ class DatasetWriter:
             )
         stops = {
             "frames/match": n_matches,
-            "frames/detail type": types.shape[1],
+            "frames/code type": types.shape[1],
             "samples/frame": self.n_frames,
             "samples/player": 11,
             "samples/kind": len(CLONED_KINDS),

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, FLAG_ON_FIELD
+from teamclone.dataset.layout import CODE, FLAG_ON_FIELD
 from teamclone.dataset.reader import Dataset
 from teamclone.models.features import PaperFeatures
 from teamclone.models.mirror import mirror_places, mirror_state, mirror_target
@@ -28,7 +28,6 @@ MAKE_ROWS = 8192
 """Samples whose inputs are made at once; bounds memory."""
 MEAN_ROWS = 2**17
 """Training samples that mean positions are taken over, evenly spread."""
-_FLAGS = [channel.name for channel in DETAIL_CHANNELS].index("flags")
 
 
 class Batch(NamedTuple):
@@ -192,7 +191,7 @@ def counterparts(dataset: Dataset, rows: NDArray[np.int64]) -> Tensor:
     """`mirror_places` of the players' mean positions in the frames of these samples."""
     frames = dataset.samples["frame"].numpy()[rows[:: max(1, len(rows) // MEAN_ROWS)]]
     position = dataset.frames["position"].numpy()[frames].astype(np.float64)
-    there = (dataset.frames["detail"].numpy()[frames, :, _FLAGS] & FLAG_ON_FIELD) != 0
+    there = (dataset.frames["code"].numpy()[frames, :, CODE["flags"]] & FLAG_ON_FIELD) != 0
     count = there.sum(0)[:, None]
     total = np.where(there[..., None], position, 0.0).sum(0)
     return mirror_places(np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0))

@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 from torch import Tensor
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, STEPS
+from teamclone.dataset.layout import CODE, DETAIL, MISSING, STEPS
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
 from teamclone.models.features import BODY_LIMIT_DEG, PaperFeatures, TypeParameters
@@ -25,8 +25,8 @@ from teamclone.models.state import TYPE_FIELD
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import FIELDS
 
-_DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
-_VX, _VY, _BODY, _TYPE = (_DETAIL[name] for name in ("vx", "vy", "body", "type"))
+_VX, _VY, _BODY = (DETAIL[name] for name in ("vx", "vy", "body"))
+_TYPE = CODE["type"]
 _VELOCITY_STEP, _BODY_STEP = STEPS[_VX], STEPS[_BODY]
 _MAX_X, _MAX_Y, _BODY_LIMIT = (np.float32(limit) for limit in (pitch.MAX_X, pitch.MAX_Y, BODY_LIMIT_DEG))
 _NAN = np.float32(math.nan)
@@ -34,8 +34,8 @@ _NAN = np.float32(math.nan)
 _FAR, _NEAR = 16, 4
 """How many samples ahead a sample's own entries and those of its frame are asked for. A random frame lies in no cache:
 waiting for it takes three times as long as all arithmetic."""
-_FRAME_LINES, _POSITION_LINES = 9, 3
-"""Cache lines of 64 bytes of a frame's ``detail`` and ``position``."""
+_DETAIL_LINES, _POSITION_LINES, _CODE_LINES = 7, 3, 2
+"""Cache lines of 64 bytes of a frame's ``detail``, ``position`` and ``code``."""
 
 
 class Gather:
@@ -47,7 +47,7 @@ class Gather:
         self.n_columns = len(features.names)
         self.arguments: tuple[Any, ...] = (
             *(samples[name].numpy() for name in ("frame", "player")),
-            *(frames[name].numpy() for name in ("match", "ball", "position", "detail")),
+            *(frames[name].numpy() for name in ("match", "ball", "position", "detail", "code")),
             kinds.reshape(-1, len(FIELDS)),
             kinds.shape[1],
             (kinds[..., TYPE_FIELD["player_speed_max"]] * kinds[..., TYPE_FIELD["player_decay"]]).reshape(-1),
@@ -110,6 +110,7 @@ def _gather(
     ball: NDArray[np.float32],
     position: NDArray[np.float32],
     detail: NDArray[np.int16],
+    code: NDArray[np.uint8],
     parameters: NDArray[np.float32],
     types_per_match: int,
     speed: NDArray[np.float32],
@@ -140,8 +141,10 @@ def _gather(
             _prefetch(ball, frame * 4)
             for line in range(_POSITION_LINES):
                 _prefetch(position, frame * 44 + line * 16)
-            for line in range(_FRAME_LINES):
+            for line in range(_DETAIL_LINES):
                 _prefetch(detail, frame * detail.shape[1] * detail.shape[2] + line * 32)
+            for line in range(_CODE_LINES):
+                _prefetch(code, frame * code.shape[1] * code.shape[2] + line * 64)
 
         row = rows[index]
         if row < 0 or row >= n_samples:
@@ -149,13 +152,15 @@ def _gather(
         frame, actor = np.int64(sample_frame[row]), sample_player[row]
         if frame < 0 or frame >= n_frames or actor >= 22:
             return index
-        first = frame_match[frame] * types_per_match
+        first = np.int64(frame_match[frame]) * types_per_match
+        if first < 0 or first >= len(speed):
+            return index
         value[:4] = ball[frame]
         for player in range(22):
             channels = detail[frame, player]
-            kind = first + channels[_TYPE]
-            if kind < 0 or kind >= len(speed):
+            if code[frame, player, _TYPE] >= types_per_match:
                 return index
+            kind = first + np.int64(code[frame, player, _TYPE])
             place[player] = kind
             vx, vy, body = channels[_VX], channels[_VY], channels[_BODY]
             value[4 + player] = position[frame, player, 0]

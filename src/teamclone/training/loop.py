@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING, Split
+from teamclone.dataset.layout import CODE, DETAIL, MISSING, NO_CODE, Split
 from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
@@ -33,7 +33,6 @@ from teamclone.training.group import joined, local_rank
 from teamclone.training.run import BASE, BEST, RESUME, Base, Run, create_run, locked, open_run, save_config
 from teamclone.training.scores import Scores
 
-DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
 FIT_ROWS = 2**20
 """Training samples that the input normalisation is fitted on, evenly spread; more would not move it."""
 WARM_UP = 200
@@ -353,13 +352,14 @@ def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
 def _check_whole(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> None:
     """See that the frames of these samples hold every value that the inputs need."""
     frames = np.unique(dataset.samples["frame"].numpy()[rows])
-    needed = [name for name in model.inputs.channels if name in DETAIL]
+    needed = model.inputs.channels
     for start in range(0, len(frames), GATHER_ROWS):
         part = frames[start : start + GATHER_ROWS]
         ball = dataset.frames["ball"].numpy()[part]
-        detail = dataset.frames["detail"].numpy()[part]
+        detail, code = (dataset.frames[name].numpy()[part] for name in ("detail", "code"))
         lacking = {f"ball_{name}": np.isnan(ball[:, index]) for index, name in enumerate(("x", "y", "vx", "vy"))}
-        lacking |= {name: (detail[..., DETAIL[name]] == MISSING).any(1) for name in needed}
+        lacking |= {name: (detail[..., DETAIL[name]] == MISSING).any(1) for name in needed if name in DETAIL}
+        lacking |= {name: (code[..., CODE[name]] == NO_CODE).any(1) for name in needed if name in CODE}
         for name, column in lacking.items():
             if column.any():
                 match = dataset.matches[int(dataset.frames["match"][part[column][0]])]

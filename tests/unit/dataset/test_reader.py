@@ -8,15 +8,13 @@ import pytest
 import torch
 from tests.synthetic import make_dataset
 
-from teamclone.dataset.layout import DETAIL_CHANNELS, FRAME_ARRAYS, MISSING, PLAYER_CHANNELS, SAMPLE_ARRAYS, Split
+from teamclone.dataset.layout import CODE, DETAIL, FRAME_ARRAYS, MISSING, NO_CODE, PLAYER_CHANNELS, SAMPLE_ARRAYS, Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import DatasetError
 from teamclone.models.state import CHANNEL, TYPE_FIELD
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import FIELDS
-
-DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
 
 
 def tiny(folder: Path, **changes: np.ndarray) -> Path:
@@ -30,10 +28,10 @@ def tiny(folder: Path, **changes: np.ndarray) -> Path:
     frames["detail"][1, 7, DETAIL["body"]] = -17999
     frames["detail"][1, 7, DETAIL["stamina"]] = 31999
     frames["detail"][1, 7, DETAIL["capacity"]] = 32650
-    frames["detail"][1, 7, DETAIL["type"]] = 2
-    frames["detail"][1, 7, DETAIL["last_command"]] = CommandKind.KICK
-    frames["detail"][1, 3, DETAIL["last_command"]] = CommandKind.CATCH
-    frames["detail"][0, 5, DETAIL["last_command"]] = MISSING
+    frames["code"][1, 7, CODE["type"]] = 2
+    frames["code"][1, 7, CODE["last_command"]] = CommandKind.KICK
+    frames["code"][1, 3, CODE["last_command"]] = CommandKind.CATCH
+    frames["code"][0, 5, CODE["last_command"]] = NO_CODE
     frames["detail"][0, :, DETAIL["neck"]] = MISSING
     samples["frame"][:] = (0, 1, 1)
     samples["player"][:] = (5, 7, 3)
@@ -183,7 +181,7 @@ def test_missing_foreign_or_other_format(tmp_path: Path) -> None:
     document = tiny(tmp_path / "ds") / "dataset.json"
     meta = json.loads(document.read_text())
     document.write_text(json.dumps(meta | {"format": 99}))
-    with pytest.raises(DatasetError, match=r"dataset of format 99, this version reads 1; make it again"):
+    with pytest.raises(DatasetError, match=r"dataset of format 99, this version reads 2; make it again"):
         open_dataset(tmp_path / "ds")
     for text in ("{", "[]", "{}", "3"):
         document.write_text(text)

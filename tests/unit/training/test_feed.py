@@ -13,7 +13,7 @@ import torch
 from tests.synthetic import make_dataset
 
 from teamclone.dataset.build import DatasetConfig, build_dataset
-from teamclone.dataset.layout import DETAIL_CHANNELS, MISSING
+from teamclone.dataset.layout import CODE, MISSING
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError
 from teamclone.logs import read_match
@@ -74,8 +74,7 @@ def test_what_a_log_lacks_is_not_a_number_in_the_same_places(
 ) -> None:
     rng = np.random.default_rng(0)
     detail, ball = (made.frames[name].numpy().copy() for name in ("detail", "ball"))
-    kind = [channel.name for channel in DETAIL_CHANNELS].index("type")
-    detail[(rng.random(detail.shape) < 0.1) & (np.arange(detail.shape[2]) != kind)] = MISSING
+    detail[rng.random(detail.shape) < 0.1] = MISSING
     ball[rng.random(ball.shape) < 0.1] = np.nan
     lacking = open_dataset(
         make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/detail": detail, "frames/ball": ball})
@@ -220,14 +219,14 @@ def test_kept_inputs_are_those_made_anew(made: Dataset) -> None:
 def test_counterparts_follow_from_where_players_stand(made: Dataset, tmp_path: Path) -> None:
     """Players off the field do not count; the made team stands anywhere, so it is put in its places."""
     position = made.frames["position"].numpy().copy()
-    detail = made.frames["detail"].numpy().copy()
+    code = made.frames["code"].numpy().copy()
     aside = np.array([0, -20, 20, -8, 8, 0, 0, 0, 0, 0, 0], np.float32)
     position[:, :11] = np.stack([np.linspace(-50, 20, 11) // 10 * 10 * (aside == 0), aside], -1)
     # Number 2 is carried off for half of the frames, to the bench of number 5's side.
     position[60:, 1] = (0, 40)
-    detail[60:, 1, [channel.name for channel in DETAIL_CHANNELS].index("flags")] = 0
+    code[60:, 1, CODE["flags"]] = 0
     placed = open_dataset(
-        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/position": position, "frames/detail": detail})
+        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/position": position, "frames/code": code})
     )
     assert counterparts(placed, np.arange(len(placed)))[:5].tolist() == [0, 2, 1, 4, 3]
 

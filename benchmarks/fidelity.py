@@ -126,9 +126,13 @@ def ablations() -> dict[str, tuple[str, ...]]:
         if block not in model.blocks:
             found[f"with-{block}"] = (f"model.blocks={','.join((*model.blocks, block))}",)
     found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0.0")
+    found["without-attention"] = ("model.kick_attention=0",)
+    lists = ("mates", "opponents", "rivals")
+    found["lists"] = (f"model.kick_blocks={','.join((*model.kick_blocks, *lists))}", "model.kick_attention=0")
+    found["without-kicks"] = ("train.kicks=0",)
     found["point-head"] = (
-        *("model.head=point", "model.parameter_hidden=[]", "train.aim_weight=0.0"),
-        *("model.kick_blocks=[]", "model.kick_hidden=[]", "model.kick_dropout=0.0"),
+        *("model.head=point", "model.parameter_hidden=[]", "train.aim_weight=0.0", "train.kicks=0"),
+        *("model.kick_blocks=[]", "model.kick_hidden=[]", "model.kick_dropout=0.0", "model.kick_attention=0"),
         *("train.parameter_loss=masked", "train.parameter_weight=1.0"),
     )
     found["gelu" if model.activation != "gelu" else "relu"] = (
@@ -246,7 +250,7 @@ class Work:
     @cached_property
     def columns(self) -> tuple[RelativeFeatures, torch.Tensor]:
         """All blocks of inputs of ``rows``, (n, columns): they cost more than a network's answers, so once for all."""
-        features = RelativeFeatures(BLOCKS)
+        features = RelativeFeatures(BLOCKS, others=True)
         made = torch.empty(len(self.rows), len(features.names))
         start = 0
         for part in chunks(self.rows):
@@ -392,11 +396,10 @@ class Work:
         return {"sets": self.figures(self.counted.answer(name, self.bare()))}
 
     def tree(self, *, rows: int, iterations: int) -> dict[str, Any]:
-        """Gradient-boosted trees on the columns of preset best, stopped by the validation matches."""
+        """Gradient-boosted trees on all blocks of relative inputs, stopped by the validation matches."""
         from sklearn.ensemble import HistGradientBoostingClassifier
 
-        model = load_config("best").model
-        features = RelativeFeatures(tuple({*model.blocks, *model.kick_blocks}))
+        features = RelativeFeatures()
 
         def columns(index: NDArray[np.int64]) -> NDArray[np.float32]:
             parts = [self._columns(features, part) for part in chunks(index)]

@@ -296,9 +296,9 @@ degree; lower is better.
 
 
 ABLATIONS_TEXT = """`without-X` leaves a block of inputs out, of the command's and of the kick's part; `with-X`
-adds one to the command's part; the others change what their settings say. Changes are to `short`, the preset `best`
-on the same shorter schedule: positive nats are worse, of the command's cross-entropy and of the log loss of
-parameters alike."""
+adds one to the command's part; `lists` has the other players as lists of the nearest instead of by attention; the
+others change what their settings say. Changes are to `short`, the preset `best` on the same shorter schedule: positive
+nats are worse, of the command's cross-entropy and of the log loss of parameters alike."""
 REMEDIES_TEXT = """What is said to help with rare commands, beside the preset `best` on the same shorter
 schedule. The class probabilities of balanced trainings are corrected for the balance unless `train.prior_correction`
 is off. `ensemble` trains three networks side by side."""

@@ -208,7 +208,11 @@ RELATIVE = (
     "model.head=mixture",
     "train.parameter_weight=0.1",
 )
-REMEDIES = (*RELATIVE, "train.balance=oversample", "train.calibrate=true", "data.mirror=0.5")
+REMEDIES = (
+    *RELATIVE,
+    *("train.balance=oversample", "train.calibrate=true", "data.mirror=0.5"),
+    *("model.kick_attention=4", "model.kick_dropout=0.1", "train.kicks=8"),
+)
 BASES: dict[str, Sequence[str]] = {
     "paper": (),
     "relative": RELATIVE,
@@ -224,6 +228,7 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "model.aim_hidden": ("relative", ["model.aim_hidden=9"]),
     "model.parameter_hidden": ("relative", ["model.parameter_hidden=9"]),
     "model.kick_hidden": ("relative", ["model.kick_hidden=9"]),
+    "model.kick_attention": ("relative", ["model.kick_attention=4"]),
     "model.kick_dropout": ("relative", ["model.kick_dropout=0.5"]),
     "model.hidden": ("paper", ["model.hidden=[17]"]),
     "model.activation": ("paper", ["model.activation=tanh"]),
@@ -247,6 +252,7 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "train.parameter_loss": ("paper", ["train.parameter_loss=masked"]),
     "train.parameter_weight": ("paper", ["train.parameter_weight=2"]),
     "train.aim_weight": ("relative", ["train.aim_weight=1"]),
+    "train.kicks": ("relative", ["train.kicks=8"]),
     "train.balance": ("paper", ["train.balance=undersample"]),
     "train.balance_strength": ("weights", ["train.balance_strength=0.5"]),
     "train.prior_correction": ("weights", ["train.prior_correction=false"]),
@@ -300,7 +306,7 @@ def test_nothing_else_has_an_effect(dataset: Dataset, tmp_path: Path, usual: tup
 
 def test_what_is_kept_in_memory_changes_no_result(dataset: Dataset, tmp_path: Path) -> None:
     """Nothing, the plain inputs, or all; 4 bytes of each input of 500 training and 128 validation samples."""
-    inputs = len(Clone(tiny(*RELATIVE).model).inputs.names)
+    inputs = len(Clone(tiny(*REMEDIES).model).inputs.names)
     told: list[tuple[int, ...]] = []
 
     def trained(keep_gb: float) -> dict[str, Any]:
@@ -324,6 +330,17 @@ def test_the_remedies_resume_bit_for_bit(dataset: Dataset, tmp_path: Path) -> No
     resumed = train(config, dataset, tmp_path / "run", resume=True)
     assert figures(resumed) == figures(whole)
     assert weights(resumed) == weights(whole)
+
+
+def test_kicks_beside_the_batches_teach_the_layers_of_kicks_and_no_other(dataset: Dataset, tmp_path: Path) -> None:
+    def trained(name: str, *settings: str) -> dict[str, Any]:
+        run = train(tiny(*RELATIVE, "train.epochs=1", *settings), dataset, tmp_path / name)
+        return load_file(run.checkpoint_path("last"))
+
+    plain, taught = trained("plain"), trained("taught", "train.kicks=16")
+    for name, weight in plain.items():
+        of_kicks = name.startswith(("trunk.kick.", "head.kick.", "head.tackle."))
+        assert torch.equal(weight, taught[name]) != of_kicks, name
 
 
 def test_a_calibrated_model_answers_at_the_temperature_of_its_record(dataset: Dataset, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from teamclone.dataset import clean, layout
 from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
-from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.errors import DatasetError, UsageError
@@ -188,6 +187,8 @@ def build_dataset(
 
 def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
     """Whether the dataset in a folder is what ``build_dataset`` would make of the store now."""
+    from teamclone.dataset.reader import open_dataset  # imports PyTorch, which takes longer than to clean many matches
+
     try:
         meta = open_dataset(folder).meta
     except DatasetError:

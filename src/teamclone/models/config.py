@@ -10,6 +10,8 @@ BLOCKS = ("self", "role", "type", "last", "view", "ball", "reach", "lines", "mat
 """Blocks of the relative inputs, in the order of their columns; see `relative.RelativeFeatures`."""
 HEADS = ("point", "mixture")
 """Forms of the answer: the paper's point, or a distribution of every parameter."""
+ATTENTION_HEADS = 4
+"""Of `crowd.Crowd`."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
 """Hidden activations."""
 
@@ -29,6 +31,8 @@ class ModelConfig:
         parameter_hidden: widths of the layers that find power and direction of dashes and turns.
         kick_hidden: widths of the layers that decide where a kick goes.
         kick_dropout: `dropout` of these, of which there are few examples.
+        kick_attention: numbers by which each other player is known to these; see `crowd.Crowd`. A multiple of
+            ATTENTION_HEADS; 0 for no such layers.
         hidden: widths of the hidden layers.
         activation: see `ACTIVATIONS`.
         dropout: share of the hidden units left out at random in training.
@@ -46,6 +50,7 @@ class ModelConfig:
     parameter_hidden: tuple[int, ...] = ()
     kick_hidden: tuple[int, ...] = ()
     kick_dropout: float = 0.0
+    kick_attention: int = 0
     hidden: tuple[int, ...] = (512, 256, 128)
     activation: str = "relu"
     dropout: float = 0.0

@@ -43,10 +43,11 @@ class Situation(NamedTuple):
     Attributes:
         hidden: (batch, width) what the command is decided on.
         parameters: (batch, parameter width) what dashes and turns are.
-        kick, kick_geometry: (2 * kicks, kick width) and (2 * kicks, len(GEOMETRY)) what kicks and tackles are, first
-            of the situations as they are, then of the same mirrored.
+        kick, kick_geometry: (2 * kicks, kick width) and (2 * kicks, columns of geometry) what kicks and tackles are,
+            first of the situations as they are, then of the same mirrored.
+        targets: (2 * kicks, TARGETS, width) what `crowd.Crowd` says of those to kick to; None without one.
         kicks: (kicks,) which situations these are; None for all.
-        geometry: (batch, len(GEOMETRY)).
+        geometry: (batch, at least len(GEOMETRY)).
         bearing, power: (batch, aims) as of `aims.Aims`.
     """
 
@@ -54,6 +55,7 @@ class Situation(NamedTuple):
     parameters: Tensor
     kick: Tensor
     kick_geometry: Tensor
+    targets: Tensor | None
     kicks: Tensor | None
     geometry: Tensor
     bearing: Tensor
@@ -162,7 +164,7 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are. aims: places of `aims.Aims`.
+            kicks are, target_width: of what is known of each target. aims: places of `aims.Aims`.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.
@@ -170,13 +172,13 @@ class MixtureHead(nn.Module):
 
     temperature: Tensor
 
-    def __init__(self, width: int, parameter_width: int, kick_width: int, aims: int) -> None:
+    def __init__(self, width: int, parameter_width: int, kick_width: int, target_width: int, aims: int) -> None:
         super().__init__()
         self.n_dash, self.n_turn = aims + INCOMES + FREE, aims + 2 + FREE
         self.command = nn.Linear(width, len(CLONED_KINDS))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
-        self.kick = Kicks(kick_width)
+        self.kick = Kicks(kick_width, target_width)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))
@@ -226,7 +228,7 @@ class MixtureHead(nn.Module):
 
     def _kick(self, situation: Situation) -> tuple[Kick, Kick]:
         """As the situation is and from its mirror: what is right on the left is right on the right."""
-        both = self.kick(situation.kick, situation.kick_geometry)
+        both = self.kick(situation.kick, situation.kick_geometry, situation.targets)
         tackle = self.tackle(situation.kick).float()
         (power, power_mirrored), (direction, direction_mirrored) = (mixture.halves(part) for part in both)
         # Class k lies at k steps, its mirror at -k.

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
 from teamclone.models.physics import covered
-from teamclone.models.relative import GEOMETRY, MATES, geometry_of
+from teamclone.models.relative import MATES, geometry_of, mates_of
 from teamclone.rcss import pitch
 
 FREE = 3
@@ -33,24 +34,30 @@ class Kicks(nn.Module):
 
     Args:
         width: of what a kick is decided on.
+        target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
     """
 
     goal: Tensor
     cycles: Tensor
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, target_width: int = 0) -> None:
         super().__init__()
         self.layer = nn.Linear(width, 6 * COUNT)
+        self.target = nn.Linear(target_width, 6) if target_width else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
-    def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
+    def forward(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None = None) -> tuple[Mixture, Mixture]:
         """Power and direction (radians from the body).
 
         Args:
-            hidden: (batch, width). geometry: (batch, len(GEOMETRY)).
+            hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
+            targets: (batch, TARGETS, target width), None for nothing.
         """
         raw = self.layer(hidden).float().view(-1, 6, COUNT)
+        if self.target is not None and targets is not None:
+            # The components begin with the team mates and the goal.
+            raw = raw + functional.pad(self.target(targets).float().transpose(1, 2), (0, COUNT - MATES - 1))
         with torch.autocast(hidden.device.type, enabled=False):
             logits, ahead, aside, speed, power_scale, angle_scale = raw.unbind(1)
             aimed = COUNT - len(DRIBBLES)
@@ -72,7 +79,7 @@ class Kicks(nn.Module):
 
     def _aimed(self, ahead: Tensor, aside: Tensor, speed: Tensor, geometry: Tensor) -> Tensor:
         """(batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""
-        mates = geometry[:, len(GEOMETRY) - 2 * MATES :].reshape(-1, MATES, 2)
+        mates = mates_of(geometry)
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)[:, None]
         base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, FREE, -1)], 1)
         way = base + LEAD_M * torch.stack([ahead, aside], -1) - ball

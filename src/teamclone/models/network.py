@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from teamclone.models.aims import COLUMNS, Aims, layers
 from teamclone.models.config import ModelConfig
+from teamclone.models.crowd import Crowd
 from teamclone.models.features import Features, PaperFeatures
 from teamclone.models.heads import EnsembleHead, MixtureHead, PointHead, Prediction, Situation
 from teamclone.models.relative import RelativeFeatures
@@ -50,6 +51,8 @@ class AimedTrunk(nn.Module):
                 (seen + config.hidden[-1], *config.parameter_hidden), activation, config.dropout
             )
             self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.kick_dropout)
+            width = config.kick_attention
+            self.crowd = Crowd(width, config.kick_hidden[-1]) if width else None
 
     def forward(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Situation:
         """``kicks``: which of the situations need the layers of a kick, (n,) places; None for all."""
@@ -58,12 +61,16 @@ class AimedTrunk(nn.Module):
         seen = torch.cat([columns.index_select(1, self.command_columns), aims], 1)
         hidden = self.command(seen)
         parameters = kick = both = hidden[:0]
+        targets = None
         if self.answers:
             parameters = self.parameters_of(torch.cat([seen, hidden], 1).detach())
             chosen = inputs if kicks is None else inputs.index_select(0, kicks)
             both = torch.cat([chosen, chosen * self.signs])
             kick = self.kick(both.index_select(1, self.kick_columns))
-        return Situation(hidden, parameters, kick, both[:, self.n_inputs :], kicks, geometry, bearing, power)
+            if self.crowd is not None:
+                together, targets = self.crowd(kick, both[:, self.n_inputs :])
+                kick = torch.cat([kick, together], 1)
+        return Situation(hidden, parameters, kick, both[:, self.n_inputs :], targets, kicks, geometry, bearing, power)
 
 
 class Trunks(nn.Module):
@@ -90,7 +97,8 @@ class Clone(nn.Module):
         if config.features == "paper":
             self.features = PaperFeatures(own_type=config.own_type, all_types=config.all_types)
         else:
-            self.features = RelativeFeatures(tuple({*config.blocks, *config.kick_blocks}))
+            blocks = tuple({*config.blocks, *config.kick_blocks})
+            self.features = RelativeFeatures(blocks, others=bool(config.kick_attention))
         trunks = [_trunk(config, self.features) for _ in range(config.members)]
         heads = [_head(config) for _ in range(config.members)]
         self.trunk = trunks[0] if config.members == 1 else Trunks(trunks)
@@ -138,7 +146,10 @@ def _trunk(config: ModelConfig, features: PaperFeatures | RelativeFeatures) -> n
 
 def _head(config: ModelConfig) -> PointHead | MixtureHead:
     if config.head == "mixture":
-        return MixtureHead(config.hidden[-1], config.parameter_hidden[-1], config.kick_hidden[-1], config.aims)
+        kick_width = config.kick_hidden[-1] + config.kick_attention
+        return MixtureHead(
+            config.hidden[-1], config.parameter_hidden[-1], kick_width, config.kick_attention, config.aims
+        )
     return PointHead(config.hidden[-1])
 
 

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING
+from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.models.config import BLOCKS
 from teamclone.models.features import Normalisation, TypeParameters
 from teamclone.models.mirror import mirror_state
@@ -61,10 +61,28 @@ mate_0_x, ...: the team mates, the nearest first; where one is missing, the acto
 """
 _PLACE = {name: index for index, name in enumerate(GEOMETRY)}
 
+OTHERS = MATES + 11
+"""The other players: the team mates, then the opponents, of each side the nearest first."""
+OTHER = ("x", "y", "vx", "vy", "cos", "sin", "there", "keeper")
+"""What is said of each: where he is, metres, his velocity, metres per cycle, his body direction, whether he is there,
+whether he keeps the goal. All 0 where he is not.
+"""
+
 
 def geometry_of(geometry: Tensor, *names: str) -> list[Tensor]:
     """Columns of GEOMETRY, (batch, 1) each."""
     return [geometry[:, _PLACE[name], None] for name in names]
+
+
+def mates_of(geometry: Tensor) -> Tensor:
+    """(batch, MATES, 2) where the team mates are."""
+    first = _PLACE["mate_0_x"]
+    return geometry[:, first : first + 2 * MATES].reshape(-1, MATES, 2)
+
+
+def others_of(geometry: Tensor) -> Tensor:
+    """(batch, OTHERS, len(OTHER)) of features that have them."""
+    return geometry[:, len(GEOMETRY) :].reshape(-1, OTHERS, len(OTHER))
 
 
 class RelativeFeatures(nn.Module):
@@ -72,12 +90,14 @@ class RelativeFeatures(nn.Module):
 
     Args:
         blocks: some of BLOCKS; ``scene`` is always among the columns.
+        others: end with OTHER of all OTHERS, as they are, too.
     """
 
     signs: Tensor
 
-    def __init__(self, blocks: tuple[str, ...] = BLOCKS) -> None:
+    def __init__(self, blocks: tuple[str, ...] = BLOCKS, *, others: bool = False) -> None:
         super().__init__()
+        self.others = others
         self.blocks = tuple(block for block in BLOCKS if block in blocks)
         self.history = PAST_FRAMES if "past" in blocks else 0
         self.channels = (
@@ -90,8 +110,9 @@ class RelativeFeatures(nn.Module):
         self.names = (
             *(f"{name}_{i}" for name in ("scene", *self.blocks) for i in range(parts[name].shape[1])),
             *GEOMETRY,
+            *(f"other_{i}_{name}" for i in range(OTHERS if others else 0) for name in OTHER),
         )
-        self.n_inputs = len(self.names) - len(GEOMETRY)
+        self.n_inputs = self.names.index(GEOMETRY[0])
         self.normalisation = Normalisation(self.n_inputs)
         self.register_buffer("signs", self._signs(), persistent=False)
 
@@ -111,7 +132,8 @@ class RelativeFeatures(nn.Module):
     def project(self, state: State) -> Tensor:
         """(batch, len(names)) before normalisation."""
         parts = self._parts(state)
-        return torch.cat([parts[name] for name in ("scene", *self.blocks, "geometry")], dim=1)
+        after = ("geometry", "others") if self.others else ("geometry",)
+        return torch.cat([parts[name] for name in ("scene", *self.blocks, *after)], dim=1)
 
     def fit(self, chunks: Iterable[Tensor]) -> None:
         """Fit the normalisation on what `project` makes of the training samples, chunk by chunk."""
@@ -120,7 +142,7 @@ class RelativeFeatures(nn.Module):
         self.normalisation.mean[self.signs[: self.n_inputs] < 0] = 0.0
 
     def normalise(self, columns: Tensor) -> Tensor:
-        """(batch, len(names)) of what `project` gives; GEOMETRY stays."""
+        """(batch, len(names)) of what `project` gives; GEOMETRY and OTHER stay."""
         inputs, geometry = columns[:, : self.n_inputs], columns[:, self.n_inputs :]
         return torch.cat([self.normalisation(inputs).clamp(-CLIP, CLIP), geometry], dim=1)
 
@@ -248,6 +270,8 @@ class RelativeFeatures(nn.Module):
         parts["mates"] = _nearest(others, to_me, mate, MATES)
         parts["opponents"] = _nearest(others, to_me, opponent, NEAREST_OPPONENTS)
         parts["rivals"] = _nearest(others, to_ball, opponent, RIVALS)
+        if self.others:
+            parts["others"] = _all_others(players, to_me, mate, opponent)
         if self.history:
             parts["past"] = _past(state, me, view, frames=self.history)
 
@@ -392,6 +416,19 @@ def _nearest(others: Tensor, distance: Tensor, there: Tensor, count: int) -> Ten
     nearest = torch.where(there, -distance, -math.inf).topk(count, dim=1).indices
     chosen = others.gather(1, nearest[..., None].expand(-1, -1, others.shape[2]))
     return (chosen * there.gather(1, nearest)[..., None]).flatten(1)
+
+
+def _all_others(players: Tensor, distance: Tensor, mate: Tensor, opponent: Tensor) -> Tensor:
+    """(batch, OTHERS * len(OTHER))."""
+    body = radians(players[..., CHANNEL["body"]])
+    keeper = (players[..., CHANNEL["flags"]].long() & FLAG_GOALIE) != 0
+    place_and_motion = players[..., [CHANNEL[name] for name in ("x", "y", "vx", "vy")]]
+    rest = torch.stack([torch.cos(body), torch.sin(body), torch.ones_like(body), keeper.to(body.dtype)], -1)
+    all_of_them = torch.cat([place_and_motion, rest], -1)
+    sides = [
+        _nearest(all_of_them, distance, side, count) for side, count in ((mate, MATES), (opponent, OTHERS - MATES))
+    ]
+    return torch.cat(sides, 1)
 
 
 def _past(state: State, me: Tensor, view: _View, *, frames: int) -> Tensor:

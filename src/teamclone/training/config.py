@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from teamclone.errors import UsageError, choose
-from teamclone.models.config import ACTIVATIONS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
+from teamclone.models.config import ACTIVATIONS, ATTENTION_HEADS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
 from teamclone.rcss.player_types import GROUPS
 from teamclone.settings import value_of
 
@@ -50,6 +50,7 @@ class TrainConfig:
         parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
         parameter_weight: of the parameters' error beside that of the command.
         aim_weight: of the error by which turns teach the aims; mixture head only.
+        kicks: kicks and tackles shown beside each batch, to the layers that find their parameters; mixture head only.
         balance: how rare commands are made up for: none; oversample: rows of rarer commands are drawn more often, in
             an epoch of the same length; undersample: those of frequent ones less often; weights: of the cross-entropy.
         balance_strength: 1 makes all commands equally frequent, 0.5 goes half the way in the logarithm, 0 none of it.
@@ -73,6 +74,7 @@ class TrainConfig:
     parameter_loss: str = "paper"
     parameter_weight: float = 1.0
     aim_weight: float = 0.0
+    kicks: int = 0
     balance: str = "none"
     balance_strength: float = 1.0
     prior_correction: bool = True
@@ -127,6 +129,8 @@ _AT_LEAST: dict[str, float] = {
     "train.aim_weight": 0,
     "model.parameter_hidden": 1,
     "model.kick_dropout": 0,
+    "model.kick_attention": 0,
+    "train.kicks": 0,
     "train.balance_strength": 0,
     "train.epochs": 1,
     "train.threads": 0,
@@ -222,7 +226,8 @@ def config_from(table: dict[str, Any], *, where: str, errors: Iterable[str] = ()
 def _idle(config: Config) -> list[str]:
     """Settings that would have no effect beside the others, and those that others need."""
     model, train = config.model, config.train
-    of_mixture = ("model.kick_blocks", "model.parameter_hidden", "model.kick_hidden", "model.kick_dropout")
+    of_kicks = tuple(f"model.kick_{name}" for name in ("blocks", "hidden", "dropout", "attention"))
+    of_mixture = ("model.parameter_hidden", *of_kicks, "train.kicks")
     of_relative = ("model.blocks", "model.aims", "model.aim_hidden", *of_mixture)
     tables = (("model", model, ModelConfig()), ("train", train, TrainConfig()))
     changed = {
@@ -253,6 +258,8 @@ def _idle(config: Config) -> list[str]:
         else:
             lacking = [name for name in ("parameter_hidden", "kick_hidden") if not getattr(model, name)]
             problems += [f"model.head = mixture needs model.{name}" for name in lacking]
+    if model.kick_attention % ATTENTION_HEADS:
+        problems.append(f"model.kick_attention: expected a multiple of {ATTENTION_HEADS}, got {model.kick_attention}")
     if model.head == "mixture":
         idle(("train.parameter_loss",), "model.head = mixture")
     if model.head == "point" or not model.aims:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, cast
 
@@ -39,6 +40,8 @@ WARM_UP = 200
 """Batches over which the cosine schedule rises."""
 GATHER_ROWS = 16384
 """Rows gathered at once where the batch size does not matter; bounds memory."""
+WITH_BALL = tuple(CLONED_KINDS.index(kind) for kind in (CommandKind.KICK, CommandKind.TACKLE))
+"""Classes whose parameters the layers of a kick find."""
 ONEDNN_ACTIVATIONS = ("relu", "gelu")
 """Those that PyTorch can take through oneDNN in single precision, forth and back."""
 
@@ -137,6 +140,7 @@ def train(
             aim_weight=config.train.aim_weight,
         )
         kinds = dataset.samples["kind"].numpy()[rows]
+        rows_with_ball = rows[np.isin(kinds, WITH_BALL)]
         draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(CLONED_KINDS)), device)
         batch_size = config.data.batch_size
         journal = stack.enter_context(Journal(run, done)) if group.rank == 0 else None
@@ -163,13 +167,19 @@ def train(
             batches = math.ceil(len(order) / batch_size)
             scores = Scores(device)
             model.train()
+            kicks = _kick_order(config.train, rows_with_ball, epoch=epoch, batches=batches)
+            kick_batches = feed.batches(kicks, config.train.kicks) if len(kicks) else iter(())
             for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size, mirrored=mirrored), 1):
                 for weights in optimiser.param_groups:
                     weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
                 output = answer_of(inputs, kicks=with_ball(target))
                 loss = loss_of(output, target, balance=balance, whole=whole)
+                error = loss.total
+                for kick_inputs, kick_target, whole_kicks in islice(kick_batches, 1):
+                    taught = loss_of(answer_of(kick_inputs), kick_target, whole=whole_kicks)
+                    error = error + config.train.parameter_weight * taught.parameters
                 optimiser.zero_grad(set_to_none=True)
-                loss.total.backward()  # type: ignore[no-untyped-call]
+                error.backward()  # type: ignore[no-untyped-call]
                 group.add_up_gradients(model)
                 optimiser.step()
                 with torch.no_grad():
@@ -219,8 +229,17 @@ def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], 
 
 def with_ball(target: Target) -> Tensor:
     """(n,) where a kick or tackle was given."""
-    kick, tackle = (CLONED_KINDS.index(kind) for kind in (CommandKind.KICK, CommandKind.TACKLE))
+    kick, tackle = WITH_BALL
     return torch.nonzero((target.kind == kick) | (target.kind == tackle)).squeeze(1)
+
+
+def _kick_order(config: TrainConfig, rows: NDArray[np.int64], *, epoch: int, batches: int) -> NDArray[np.int64]:
+    """The kicks and tackles to show beside the batches of an epoch, from ``rows`` with all of them: each as often."""
+    wanted = batches * config.kicks
+    if not wanted or not len(rows):
+        return rows[:0]
+    random = np.random.default_rng((config.seed, 3, epoch))
+    return np.concatenate([random.permutation(rows) for _ in range(math.ceil(wanted / len(rows)))])[:wanted]
 
 
 class Journal:

@@ -7,6 +7,8 @@ import fcntl
 import json
 import os
 import shutil
+import subprocess
+import sys
 import time
 import tracemalloc
 from collections import Counter
@@ -102,6 +104,12 @@ def test_the_same_bytes_wherever_matches_are_cleaned(
     for name, report in zip(("two", "any"), reports[1:], strict=True):
         assert content(tmp_path / name) == one
         assert report == reports[0]
+
+
+def test_building_does_without_pytorch() -> None:
+    """Which takes seconds to import, in every worker."""
+    code = "import sys, teamclone.dataset.build; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_matches_lie_behind_one_another(store: Store, config: DatasetConfig, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 import torch
@@ -147,10 +148,10 @@ MODEL = ModelConfig(
 )
 
 
-@pytest.fixture(scope="module")
-def model() -> Clone:
+@pytest.fixture(scope="module", params=[0, 8], ids=["plain", "attention"])
+def model(request: pytest.FixtureRequest) -> Clone:
     torch.manual_seed(0)
-    model = Clone(MODEL)
+    model = Clone(replace(MODEL, kick_attention=request.param))
     # Of samples that lean to one side.
     state = situations(100, seed=5)
     model.inputs.fit([model.inputs.project(State(*(tensor[state.ball[:, 1] > 0] for tensor in state)))])

@@ -111,7 +111,8 @@ MODELS = {
     "no role": replace(SMALL, blocks=("ball",)),
     "point": replace(SMALL, head="point", kick_blocks=(), kick_hidden=(), parameter_hidden=()),
     "past": replace(SMALL, blocks=("self", "past")),
-    "all": replace(SMALL, blocks=BLOCKS, kick_blocks=BLOCKS, dropout=0.2, kick_dropout=0.2),
+    "attention": replace(SMALL, kick_attention=8),
+    "all": replace(SMALL, blocks=BLOCKS, kick_blocks=BLOCKS, kick_attention=4, dropout=0.2, kick_dropout=0.2),
 }
 
 

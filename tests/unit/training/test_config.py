@@ -161,6 +161,8 @@ MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidde
         (["model.kick_hidden=[8]"], "model.kick_hidden has no effect with model.features = paper"),
         (["model.parameter_hidden=[8]"], "model.parameter_hidden has no effect with model.features = paper"),
         (["model.kick_dropout=0.1"], "model.kick_dropout has no effect with model.features = paper"),
+        (["model.kick_attention=8"], "model.kick_attention has no effect with model.features = paper"),
+        (["train.kicks=8"], "train.kicks has no effect with model.features = paper"),
         (["train.aim_weight=0.1"], "train.aim_weight has no effect with model.head = point"),
         (["model.head=mixture"], "model.head = mixture needs model.features = relative"),
         (["model.features=relative", "model.own_type=true"], "model.own_type has no effect with model.features = rel"),
@@ -189,6 +191,10 @@ MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidde
         (
             ["model.features=relative", "model.head=mixture"],
             "model.head = mixture needs model.parameter_hidden; model.head = mixture needs model.kick_hidden",
+        ),
+        (
+            ["model.features=relative", *MIXTURE, "model.kick_attention=6"],
+            "model.kick_attention: expected a multiple of 4, got 6",
         ),
         (["model.features=relative", *MIXTURE, "train.aim_weight=1"], "train.aim_weight has no effect with model.aims"),
         (

@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 MATCHES ?= samples
+COPIES ?= 1
 TEAM ?= HELIOS_base
 KILLS ?= 50
 FIDELITY := .fidelity
@@ -17,7 +18,7 @@ help:
 	@echo "make demo     train and report a clone of HELIOS_base on the bundled matches"
 	@echo "make test     run the tests"
 	@echo "make lint     ruff and mypy"
-	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name)"
+	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name, COPIES='1 3 39' of each match)"
 	@echo "make fidelity what clones know, and docs/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
 	@echo "make faults   kill ingest, dataset and train KILLS times each and resume (default 50)"
 	@echo "make fuzz     fuzz every log reader for MINUTES (default 30)"
@@ -61,9 +62,9 @@ format: install
 
 bench: install
 	$(BIN)/python benchmarks/reading.py $(MATCHES)
-	$(BIN)/python benchmarks/ingest.py $(MATCHES)
+	$(BIN)/python benchmarks/ingest.py $(MATCHES) --copies $(COPIES)
 	rm -rf .bench && $(BIN)/teamclone ingest $(MATCHES) --store .bench/store
-	$(BIN)/python benchmarks/dataset.py .bench/store --team $(TEAM)
+	$(BIN)/python benchmarks/dataset.py .bench/store --team $(TEAM) --copies $(COPIES)
 	$(BIN)/teamclone dataset --store .bench/store --team $(TEAM) --out .bench/dataset >/dev/null
 	$(BIN)/python benchmarks/training.py .bench/dataset
 	$(BIN)/python benchmarks/stores.py $(MATCHES) --count 2

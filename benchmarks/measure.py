@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from typing import BinaryIO
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,14 +33,14 @@ class Cost:
 HEADERS = ("wall", "cpu", "cpu a match", "wall ratio", "cpu ratio", "largest process")
 
 
-def cost_of(*command: object) -> Cost:
-    """Runs a command to its end; its output goes nowhere.
+def cost_of(*command: object, output: BinaryIO | None = None) -> Cost:
+    """Runs a command to its end; its output goes to a file, or nowhere.
 
     Raises:
         SystemExit: it failed.
     """
     start = time.perf_counter()
-    process = subprocess.Popen([*map(str, command)], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([*map(str, command)], stdout=output or subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     wall = time.perf_counter() - start
     if status:

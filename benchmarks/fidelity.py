@@ -1,13 +1,13 @@
 """How faithful a clone is: baselines, presets, what each part gains, and why it stops; then writes the results page.
 
-    python benchmarks/fidelity.py MATCHES --out DIR [--only c,b,a,f,d,e,g] [--page docs/fidelity.md]
+    python benchmarks/fidelity.py MATCHES --out DIR [--only c,b,a,k,f,d,e,g] [--page docs/fidelity.md]
 
 MATCHES is a folder of logs. Steps, in the order in which --only names them:
 
     c  preset best, three seeds          f  learning curve over 1, 2, 5, 10 and all training matches
     b  preset paper, eight minutes       d  preset best without each of its parts, on a shorter schedule
     a  rules, gradient-boosted trees     e  remedies for rare commands, on the same shorter schedule
-                                         g  what is left: from the results of c and f
+    k  how kicks come to know others     g  what is left: from the results of c and f
 
 --only also takes single results by name. Each result is a file DIR/results/NAME.json; what is there is not done again,
 and a training that was interrupted goes on. The page is written anew at the end from the results that there are.
@@ -56,7 +56,7 @@ from teamclone.training.run import is_run, open_run
 FORMAT = 1
 """Of the result files; raised whenever they would be misread."""
 TEST_MATCHES = ("20261122110359", "20261122112951")
-STEPS = "cbafdeg"
+STEPS = "cbakfdeg"
 SEEDS = (0, 1, 2)
 PAPER_MINUTES = 8.0
 SHORT_EPOCHS = 6
@@ -69,6 +69,19 @@ CHUNK = 16384
 SURE = 0.8
 """Confidence from which an error that all seeds make counts as systematic."""
 
+PLAIN = (
+    "model.kick_blocks=self,type,last,ball,reach,lines,mates,opponents,rivals",
+    "model.kick_attention=0",
+    "train.kicks=0",
+)
+"""Kicks as they were without attention: what changes nothing of kicks is compared with these settings. The layers of
+the command share nothing with those of kicks, and these take a third of the time."""
+KICKS: dict[str, tuple[str, ...]] = {
+    "without-attention": ("model.kick_attention=0",),
+    "lists": PLAIN[:2],
+    "without-kicks": ("train.kicks=0",),
+}
+"""How kicks may know of the other players, and how often they are shown: name and settings beside the preset's."""
 REMEDIES: dict[str, tuple[str, ...]] = {
     "oversample": ("train.balance=oversample", "train.balance_strength=0.5"),
     "undersample": ("train.balance=undersample", "train.balance_strength=0.5"),
@@ -113,8 +126,8 @@ def without(blocks: Sequence[str], *names: str) -> str:
 
 
 def ablations() -> dict[str, tuple[str, ...]]:
-    """Preset best without each of its parts, and with those it leaves out: name and settings."""
-    model = load_config("best").model
+    """`plain` without each of its parts, and with those it leaves out: name and settings beside PLAIN."""
+    model = load_config("best", PLAIN).model
     found: dict[str, tuple[str, ...]] = {}
     for block in dict.fromkeys((*model.blocks, *model.kick_blocks)):
         found[f"without-{block}"] = tuple(
@@ -126,13 +139,9 @@ def ablations() -> dict[str, tuple[str, ...]]:
         if block not in model.blocks:
             found[f"with-{block}"] = (f"model.blocks={','.join((*model.blocks, block))}",)
     found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0.0")
-    found["without-attention"] = ("model.kick_attention=0",)
-    lists = ("mates", "opponents", "rivals")
-    found["lists"] = (f"model.kick_blocks={','.join((*model.kick_blocks, *lists))}", "model.kick_attention=0")
-    found["without-kicks"] = ("train.kicks=0",)
     found["point-head"] = (
-        *("model.head=point", "model.parameter_hidden=[]", "train.aim_weight=0.0", "train.kicks=0"),
-        *("model.kick_blocks=[]", "model.kick_hidden=[]", "model.kick_dropout=0.0", "model.kick_attention=0"),
+        *("model.head=point", "model.parameter_hidden=[]", "train.aim_weight=0.0"),
+        *("model.kick_blocks=[]", "model.kick_hidden=[]", "model.kick_dropout=0.0"),
         *("train.parameter_loss=masked", "train.parameter_weight=1.0"),
     )
     found["gelu" if model.activation != "gelu" else "relu"] = (
@@ -168,14 +177,17 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
         # Half way between as many passes and as many steps as with all matches.
         longer = epochs(short_epochs * (n_train / count) ** 0.5)
         made.append(
-            Experiment(name=f"curve-{count}", step="f", preset="best", overrides=(*tiny, *longer), matches=count)
+            Experiment(
+                name=f"curve-{count}", step="f", preset="best", overrides=(*tiny, *longer, *PLAIN), matches=count
+            )
         )
     short = (*tiny, *epochs(short_epochs))
-    # Beside which the others of d and e stand, and the last point of f.
-    made.append(Experiment(name="short", step="def", preset="best", overrides=short))
-    for step, variants in (("d", ablations()), ("e", REMEDIES)):
+    # Beside which the others of k stand, and those of d and e; the second is the last point of f, too.
+    made.append(Experiment(name="short", step="k", preset="best", overrides=short))
+    made.append(Experiment(name="plain", step="def", preset="best", overrides=(*short, *PLAIN)))
+    for step, beside, variants in (("k", (), KICKS), ("d", PLAIN, ablations()), ("e", PLAIN, REMEDIES)):
         made += [
-            Experiment(name=name, step=step, preset="best", overrides=(*short, *changes))
+            Experiment(name=name, step=step, preset="best", overrides=(*short, *beside, *changes))
             for name, changes in variants.items()
         ]
     return made
@@ -443,7 +455,7 @@ class Work:
         curve = sorted(
             (result["training_matches"], result)
             for name, result in results.items()
-            if name.startswith("curve-") or name == "short"
+            if name.startswith("curve-") or name == "plain"
         )
         if len(curve) > 3:
             found["curve"] = {
@@ -608,7 +620,7 @@ def parser() -> argparse.ArgumentParser:
         "--test-match", nargs="*", default=list(TEST_MATCHES), help="ids or parts of names; none: as the split gives"
     )
     made.add_argument("--minutes-scale", type=float, default=1.0, help="of all lengths: minutes and epochs")
-    made.add_argument("--short-epochs", type=int, default=SHORT_EPOCHS, help="of the schedule of d, e and f")
+    made.add_argument("--short-epochs", type=int, default=SHORT_EPOCHS, help="of the schedule of d, e, f and k")
     made.add_argument("--quick", action="store_true", help="tiny networks, an epoch each: to try the benchmark itself")
     return made
 
@@ -648,7 +660,7 @@ def main() -> None:
         page,
         results=work.load(),
         left=json.loads(left.read_text(encoding="utf-8")) if left.is_file() else {},
-        variants={"d": ablations(), "e": REMEDIES},
+        variants={"k": KICKS, "d": ablations(), "e": REMEDIES},
         cleaning=work.dataset.meta["cleaning"],
         commands=[work.told(command) for command in work.commands],
         situations=SITUATIONS,

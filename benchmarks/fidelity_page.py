@@ -81,13 +81,14 @@ def write(
     """Write the page, and beside it the plot of the learning curve.
 
     Args:
-        results: by name. left: of step g. variants: settings of steps d and e by name.
+        results: by name. left: of step g. variants: settings of steps k, d and e by name.
         cleaning: the dataset's report; None where nothing was run. commands: that made store and dataset.
     """
     parts = [_head(results)]
     if results and cleaning is not None:
         parts += [_protocol(cleaning)]
     parts += [_goals(results), _spread(results), _numbers(results), _likelihood(results)]
+    parts += [_kicks(results, variants.get("k", {}))]
     parts += [_variants("What each part gains", ABLATIONS_TEXT, results, variants.get("d", {}))]
     parts += [_variants("Rare commands", REMEDIES_TEXT, results, variants.get("e", {}), rare=True)]
     curve = left.get("curve")
@@ -296,25 +297,59 @@ degree; lower is better.
 
 
 ABLATIONS_TEXT = """`without-X` leaves a block of inputs out, of the command's and of the kick's part; `with-X`
-adds one to the command's part; `lists` has the other players as lists of the nearest instead of by attention; the
-others change what their settings say. Changes are to `short`, the preset `best` on the same shorter schedule: positive
-nats are worse, of the command's cross-entropy and of the log loss of parameters alike."""
-REMEDIES_TEXT = """What is said to help with rare commands, beside the preset `best` on the same shorter
-schedule. The class probabilities of balanced trainings are corrected for the balance unless `train.prior_correction`
+adds one to the command's part; the others change what their settings say. Changes are to `plain`, which has the other
+players of a kick as lists of the nearest, on the shorter schedule: positive nats are worse, of the command's
+cross-entropy and of the log loss of parameters alike."""
+REMEDIES_TEXT = """What is said to help with rare commands, beside `plain` on the same shorter schedule. The
+class probabilities of balanced trainings are corrected for the balance unless `train.prior_correction`
 is off. `ensemble` trains three networks side by side."""
+
+
+def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
+    """Of step k."""
+    made = [name for name in variants if name in results]
+    if not made or "short" not in results:
+        return ""
+    names = _sets(results)
+
+    def cell(name: str, find: Callable[[Any], Any], digits: int) -> str:
+        return " / ".join(number(mean([results[name]], item, find), digits) for item in names)
+
+    rows = [
+        [
+            f"`{name}`",
+            ", ".join(f"`{setting}`" for setting in variants.get(name, ())),
+            *(cell(name, _parameter("kick_direction", what), 1) for what in ("mean", "median")),
+            cell(name, _parameter("kick_power", "mean"), 1),
+            cell(name, _command("kick", "parameter_log_loss"), 2),
+            number(results[name]["seconds"] / 60, 1),
+        ]
+        for name in ("short", *made)
+    ]
+    headers = (
+        *("variant", "settings", "kick direction, mean error, deg", "median error, deg", "kick power, mean error"),
+        *("log loss of both, nats", "minutes"),
+    )
+    return f"""## Kicks
+
+Where kicks go, and how hard, by what the layers of a kick know of the other players and by how often they see one.
+`short` is the preset `best` on the shorter schedule; in `without-attention` they know only the two nearest of each side
+to the ball, in `lists` the ten team mates, the six nearest opponents and the three nearest the ball, in a fixed order.
+
+{table(headers, rows)}"""
 
 
 def _variants(
     heading: str, text: str, results: Results, variants: Mapping[str, Sequence[str]], *, rare: bool = False
 ) -> str:
-    """Results of one step beside `short`."""
+    """Results of one step beside `plain`."""
     made = [name for name in variants if name in results]
-    if not made or "short" not in results:
+    if not made or "plain" not in results:
         return ""
-    names, base = _sets(results), results["short"]
+    names, base = _sets(results), results["plain"]
     accuracy, entropy = FIGURES[0][1], FIGURES[1][1]
     rows = []
-    for name in ("short", *made):
+    for name in ("plain", *made):
         several = [results[name]]
 
         def change(find: Callable[[Any], Any], digits: int, factor: float = 1.0, *, of: Any = several) -> str:
@@ -324,9 +359,9 @@ def _variants(
 
         cells = [
             " / ".join(number(mean(several, item, entropy), 3) for item in names),
-            NOTHING if name == "short" else change(entropy, 4),
+            NOTHING if name == "plain" else change(entropy, 4),
             " / ".join(number(mean(several, item, accuracy), 3) for item in names),
-            NOTHING if name == "short" else change(accuracy, 2, 100),
+            NOTHING if name == "plain" else change(accuracy, 2, 100),
         ]
         if rare:
             for kind in ("kick", "tackle"):
@@ -339,8 +374,8 @@ def _variants(
         else:
             for kind in ("dash", "turn", "kick"):
                 loss = _command(kind, "parameter_log_loss")
-                cells.append(NOTHING if name == "short" else change(loss, 3))
-        settings = "" if name == "short" else ", ".join(f"`{setting}`" for setting in variants[name])
+                cells.append(NOTHING if name == "plain" else change(loss, 3))
+        settings = "" if name == "plain" else ", ".join(f"`{setting}`" for setting in variants[name])
         rows.append([f"`{name}`", settings, *cells, number(results[name]["seconds"] / 60, 1)])
     headers = ["variant", "settings", "cross-entropy", "change, nats", "accuracy", "change, points"]
     if rare:
@@ -361,7 +396,7 @@ def _curve(curve: Mapping[str, Any], results: Results, *, plot: str) -> str:
     names = list(curve)
     counts = next(iter(curve.values()))["matches"]
     points = {result["training_matches"]: result for name, result in results.items() if name.startswith("curve-")}
-    points[results["short"]["training_matches"]] = results["short"]
+    points[results["plain"]["training_matches"]] = results["plain"]
     rows = []
     for place, count in enumerate(counts):
         entropies = " / ".join(number(curve[name]["cross_entropy"][place], 3) for name in names)
@@ -380,7 +415,7 @@ def _curve(curve: Mapping[str, Any], results: Results, *, plot: str) -> str:
     headers = ("set", "floor, nats", "without any one point", "exponent", "twice the matches", "ten times")
     return f"""## Learning curve
 
-The preset `best` on the shorter schedule; with fewer matches it takes more epochs, by the root of how many fewer
+`plain`, see above; with fewer matches it takes more epochs, by the root of how many fewer
 there are. Every smaller set of matches is a part of the larger ones.
 
 ![Cross-entropy by training matches]({plot})

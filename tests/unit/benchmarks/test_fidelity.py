@@ -100,9 +100,11 @@ def test_every_experiment_is_a_training_of_its_own(quick: bool) -> None:
     made = fidelity.experiments(n_train=22, scale=0.5, short_epochs=6, quick=quick)
     configs = {experiment.name: load_config(experiment.preset, experiment.overrides) for experiment in made}
     assert len(configs) == len(made)
-    variants = [configs[name] for name in (*fidelity.ablations(), *fidelity.REMEDIES, "short")]
+    variants = [
+        configs[name] for name in (*fidelity.KICKS, *fidelity.ablations(), *fidelity.REMEDIES, "short", "plain")
+    ]
     assert all(one != other for i, one in enumerate(variants) for other in variants[:i])
-    assert {experiment.step for experiment in made} == {"c", "b", "f", "def", "d", "e"}
+    assert {experiment.step for experiment in made} == {"c", "b", "k", "f", "def", "d", "e"}
     if not quick:
         assert configs["short"].train.epochs == 3
         assert configs["curve-1"].train.epochs == round(3 * 22**0.5)
@@ -159,7 +161,7 @@ def test_results_are_kept_and_their_page_has_their_numbers(work: fidelity.Work, 
 def test_the_learning_curve_is_a_table_and_a_plot(work: fidelity.Work, tmp_path: Path) -> None:
     base = work.rule("majority")
     results = {
-        "short" if count == 22 else f"curve-{count}": {
+        "plain" if count == 22 else f"curve-{count}": {
             **base,
             "name": "x",
             "training_matches": count,

@@ -40,7 +40,7 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation import baselines, metrics
-from teamclone.evaluation.evaluate import KINDS, count_training, describe, predict, truth
+from teamclone.evaluation.evaluate import count_training, describe, predict, truth
 from teamclone.evaluation.outcome import Outcome
 from teamclone.files import write_json
 from teamclone.machine import processor
@@ -49,7 +49,7 @@ from teamclone.models.network import parameter_count
 from teamclone.models.physics import kickable_area, reach_ball
 from teamclone.models.relative import RelativeFeatures
 from teamclone.models.state import CHANNEL, State
-from teamclone.rcss.commands import PARAMETERS
+from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
 
@@ -394,7 +394,7 @@ class Work:
         kind, issued, last = truth(self.dataset, self.rows)
         n = len(self.rows)
         return Outcome(
-            probabilities=np.full((n, len(KINDS)), 1 / len(KINDS), np.float32),
+            probabilities=np.full((n, len(CLONED)), 1 / len(CLONED), np.float32),
             parameters=np.zeros((n, len(PARAMETERS)), np.float32),
             parameter_log_loss=np.full(n, np.nan, np.float32),
             kind=kind,

@@ -13,13 +13,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
 
-from teamclone.evaluation.metrics import EVEN_LOG_LOSS
+from teamclone.evaluation.metrics import even_log_loss
 from teamclone.files import write_atomic
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.rcss.commands import CLONED
 
 Results = Mapping[str, Mapping[str, Any]]
 NOTHING = "-"
-KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
+KINDS = CLONED
 WIDTH = 138
 COLOURS = ("#1b6fb3", "#c46a12", "#1f9e78", "#c75b9b", "#5d6872")
 
@@ -285,7 +285,7 @@ def _likelihood(results: Results) -> str:
     if not several:
         return ""
     rows = []
-    for kind, even in zip(KINDS, EVEN_LOG_LOSS, strict=True):
+    for kind, even in even_log_loss(KINDS).items():
         losses = [mean(several, name, _command(kind, "parameter_log_loss")) for name in _sets(results)]
         rows.append([kind, *(number(loss, 2) for loss in losses), number(float(even), 2)])
     return f"""## Likelihood of parameters

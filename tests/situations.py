@@ -8,6 +8,7 @@ from teamclone.dataset.layout import FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.rcss.player_types import DEFAULTS, FIELDS, GROUPS, RANGES
+from teamclone.rcss.playmodes import PlayMode
 
 
 def situations(n: int, *, seed: int = 0, history: int = 0, dtype: torch.dtype = torch.float32) -> State:
@@ -70,6 +71,8 @@ def situations(n: int, *, seed: int = 0, history: int = 0, dtype: torch.dtype = 
         past_ball=past_ball,
         past_players=past_players,
         past_known=known,
+        mode=torch.randint(len(PlayMode), (n,), generator=generator),
+        mode_cycles=torch.randint(120, (n,), generator=generator).to(dtype),
     )
 
 
@@ -89,6 +92,8 @@ def resting(n: int = 1, *, history: int = 0, dtype: torch.dtype = torch.float32)
         past_ball=torch.zeros(n, history, 4, dtype=dtype),
         past_players=players[:, None].repeat(1, history, 1, 1),
         past_known=torch.zeros(n, history, dtype=torch.bool),
+        mode=torch.full((n,), PlayMode.PLAY_ON),
+        mode_cycles=torch.zeros(n, dtype=dtype),
     )
 
 

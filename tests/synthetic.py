@@ -9,17 +9,20 @@ import numpy as np
 
 from teamclone.dataset.layout import CODE, DETAIL, DETAIL_CHANNELS, FLAG_GOALIE, FLAG_ON_FIELD, STEPS, Split
 from teamclone.dataset.write import write_dataset
-from teamclone.rcss.commands import CLONED_KINDS, CommandKind
+from teamclone.rcss.commands import CLONED, CLONED_KINDS, CommandKind
 from teamclone.rcss.player_types import DEFAULTS, FIELDS, GROUPS, RANGES
 
 N_TYPES = 18
 
 
-def make_dataset(folder: Path, *, frames_per_match: int = 300, seed: int = 0, **changes: Any) -> Path:
+def make_dataset(
+    folder: Path, *, frames_per_match: int = 300, seed: int = 0, commands: tuple[str, ...] = CLONED, **changes: Any
+) -> Path:
     """Four matches, one per split; ``changes`` replace whole arrays ("frames/ball") before writing.
 
     What a player does follows from where he stands: beyond x = 35 he kicks, beyond |y| = 28 he tackles, in his own
-    half he turns, else he dashes; parameters follow from his place and body.
+    half he turns, else he dashes; parameters follow from his place and body. Further ``commands`` are given in strips
+    of six metres from the half-way line on.
     """
     rng = np.random.default_rng(seed)
     splits = list(Split)
@@ -53,6 +56,11 @@ def make_dataset(folder: Path, *, frames_per_match: int = 300, seed: int = 0, **
     parameters[kind == 1, 0] = -body[kind == 1]
     parameters[kind == 2] = np.stack([x, y * 4], 1)[kind == 2]
     parameters[kind == 3, 0] = -y[kind == 3]
+    for index, name in enumerate(commands[len(CLONED) :]):
+        strip = (kind == 0) & (x >= 6 * index) & (x < 6 * index + 6)
+        kind[strip] = len(CLONED) + index
+        given = {"catch": (-2 * y, 0 * y), "move": (-x, y / 2), "none": (0 * x, 0 * y)}[name]
+        parameters[strip] = np.stack(given, 1)[strip]
 
     match = np.repeat(np.arange(len(splits)), frames_per_match)
     frames = {
@@ -79,6 +87,7 @@ def make_dataset(folder: Path, *, frames_per_match: int = 300, seed: int = 0, **
         (frames if table == "frames" else samples)[array] = value
     meta = {
         "team": "Made",
+        **({"commands": commands} if commands != CLONED else {}),
         "matches": [
             {"match_id": f"{index:016x}", "opponent": f"Other{index}", "side": "left", "split": split.name.lower()}
             for index, split in enumerate(splits)

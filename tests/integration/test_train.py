@@ -263,7 +263,7 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "train.max_minutes": ("paper", ["train.max_minutes=1e-9"]),
 }
 """For each setting a base on which it has an effect, and what changes it."""
-REFUSED = {"train.device"}
+REFUSED = {"train.device", "model.commands"}
 """Only one value works here; the others are refused, which another test shows."""
 ONLY_SPEED = {"data.keep_gb"}
 """No result may depend on it, but for rounding."""

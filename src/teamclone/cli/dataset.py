@@ -25,6 +25,15 @@ def dataset(
     train_goalkeepers: Annotated[
         bool, typer.Option("--train-goalkeepers", help="Train on goalkeepers' commands, too; never test on them.")
     ] = False,
+    goalkeepers: Annotated[
+        bool, typer.Option("--goalkeepers", help="Model goalkeepers as everybody else, and catch as a command.")
+    ] = False,
+    set_plays: Annotated[
+        bool, typer.Option("--set-plays", help="Take all play modes, not only play_on, and move as a command.")
+    ] = False,
+    idle: Annotated[
+        bool, typer.Option("--idle", help="Take cycles without a body command as samples of a command none.")
+    ] = False,
     test: Annotated[float, typer.Option(help="Share of the matches for the test.", min=0, max=0.9)] = 0.15,
     validation: Annotated[float, typer.Option(help="Share of the matches for validation.", min=0, max=0.9)] = 0.15,
     test_match: Annotated[
@@ -52,6 +61,9 @@ def dataset(
         commands=choice(Commands, commands, option="--commands"),
         turn_zero=choice(TurnZero, turn_zero, option="--turn-zero"),
         train_goalkeepers=train_goalkeepers,
+        goalkeepers=goalkeepers,
+        set_plays=set_plays,
+        idle=idle,
         test_matches=tuple(test_match or ()),
         validation_matches=tuple(validation_match or ()),
         test=test,
@@ -72,10 +84,10 @@ def dataset(
     if as_json:
         print_json(report)
     else:
-        _print(report, out)
+        _print(report, out, where="in play" if set_plays else "in play_on")
 
 
-def _print(report: dict[str, Any], out: Path) -> None:
+def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
     print_table(
         ["cleaning rule", "before", "after", "dropped"],
         [
@@ -102,7 +114,7 @@ def _print(report: dict[str, Any], out: Path) -> None:
     print()
     share = report["idle"] / max(report["player_cycles"], 1)
     print(
-        f"{report['idle']:,} of {report['player_cycles']:,} player-cycles in play_on ({share:.1%}) have no body "
+        f"{report['idle']:,} of {report['player_cycles']:,} player-cycles {where} ({share:.1%}) have no body "
         f"command, {report['frozen']:,} of them after a tackle or foul."
     )
     print(f"{report['turn_zero']:,} rows are (turn 0).")

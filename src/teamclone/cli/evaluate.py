@@ -45,7 +45,7 @@ def evaluate(
 def print_summary(evaluation: dict[str, Any]) -> None:
     """The figures of an evaluation that fit on a screen."""
     from teamclone.evaluation.bootstrap import FEW_MATCHES
-    from teamclone.evaluation.metrics import EVEN_LOG_LOSS
+    from teamclone.evaluation.metrics import even_log_loss
 
     splits = evaluation["splits"]
     print(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
@@ -89,6 +89,16 @@ def print_summary(evaluation: dict[str, Any]) -> None:
             ],
             numeric=range(1, 7),
         )
+        if "situations" in split:
+            print()
+            print_table(
+                [name, "rows", "accuracy", "CE, nats"],
+                [
+                    (situation, f"{row['rows']:,}", _number(row["accuracy"], 3), _number(row["cross_entropy"], 3))
+                    for situation, row in split["situations"].items()
+                ],
+                numeric=range(1, 4),
+            )
         print()
         print_table(
             [name, "unit", "commands", "mean error", "median error", "constant guess, mean error"],
@@ -111,8 +121,9 @@ def print_summary(evaluation: dict[str, Any]) -> None:
             print_table(
                 [name, "log loss of its parameters, nats", "even guess"],
                 [
-                    (command, _cell(loss, 2), _number(float(even), 2))
-                    for (command, loss), even in zip(losses.items(), EVEN_LOG_LOSS, strict=True)
+                    (command, _cell(losses[command], 2), _number(even, 2))
+                    for command, even in even_log_loss(list(losses)).items()
+                    if command != "none"
                 ],
                 numeric=(1, 2),
             )

@@ -20,7 +20,7 @@ from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.errors import DatasetError, UsageError
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
 from teamclone.store import Store
 from teamclone.store.workers import Died, SharedStore, run_tasks
@@ -49,6 +49,9 @@ class DatasetConfig:
         train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. Teams now and
             then give the goalkeeper another number: who then plays in the field with his number may well play as he
             does, and a network that knows players by their numbers has otherwise never seen him.
+        goalkeepers: model goalkeepers as everybody else, in every split, and ``catch`` as a command.
+        set_plays: take the commands of all play modes that have a Situation, not only of play_on, and ``move`` as one.
+        idle: take cycles without a body command as samples of ``none``.
         test_matches, validation_matches: match ids or parts of log names that must fall there; the other split
             shares are then drawn from the rest.
         test, validation: share of the matches.
@@ -61,6 +64,9 @@ class DatasetConfig:
     commands: Commands = Commands.EXECUTED
     turn_zero: TurnZero = TurnZero.KEEP
     train_goalkeepers: bool = False
+    goalkeepers: bool = False
+    set_plays: bool = False
+    idle: bool = False
     test_matches: tuple[str, ...] = ()
     validation_matches: tuple[str, ...] = ()
     test: float = 0.15
@@ -71,6 +77,12 @@ class DatasetConfig:
     def team(self) -> str:
         """All teams as one name."""
         return " + ".join(self.teams)
+
+    @property
+    def repertoire(self) -> tuple[str, ...]:
+        """The commands of the dataset."""
+        wanted = {"catch": self.goalkeepers, "move": self.set_plays, "none": self.idle}
+        return tuple(name for name in REPERTOIRE if wanted.get(name, True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +101,7 @@ class _Task:
     commands: Commands
     turn_zero: TurnZero
     goalkeepers: bool
+    repertoire: tuple[str, ...]
 
 
 def build_dataset(
@@ -123,6 +136,8 @@ def build_dataset(
     """
     if config.train_goalkeepers and config.split is SplitBy.ROWS:
         raise UsageError("--train-goalkeepers keeps goalkeepers out of whole test matches; it needs --split match")
+    if config.train_goalkeepers and config.goalkeepers:
+        raise UsageError("--goalkeepers takes goalkeepers' commands in every split; leave out --train-goalkeepers")
     entries, without_team = _entries(store, config)
     splits = split_matches(
         [MatchKey(match_id=entry.match_id, team=entry.team, opponent=entry.opponent) for entry in entries],
@@ -140,12 +155,13 @@ def build_dataset(
             commands=config.commands,
             turn_zero=config.turn_zero,
             goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
+            repertoire=config.repertoire,
         )
         for entry in entries
     ]
     matches: list[dict[str, Any]] = []
     types: list[NDArray[np.float32]] = []
-    rows = np.zeros((len(layout.Split), len(CLONED_KINDS)), np.int64)
+    rows = np.zeros((len(layout.Split), len(config.repertoire)), np.int64)
     with writing_dataset(out, replace=replace) as writer:
         for task, cleaned in run_tasks(_clean, tasks, executor=executor, jobs=jobs, ahead=AHEAD, in_order=True):
             if isinstance(cleaned, Died):
@@ -161,7 +177,7 @@ def build_dataset(
                 of_rows, name = np.full(len(kind), split, np.uint8), split.name.lower()
             _add(writer, match, index=len(matches), split=of_rows)
             np.add.at(rows, (of_rows, kind), 1)
-            row = _report_match(task.entry, match, split=name)
+            row = _report_match(task.entry, match, split=name, repertoire=config.repertoire)
             matches.append(row if len(config.teams) == 1 else {"team": task.entry.team, **row})
             types.append(types_of_match)
             if on_progress is not None:
@@ -177,6 +193,7 @@ def build_dataset(
         meta = {
             "team": config.team,
             **({"teams": config.teams} if len(config.teams) > 1 else {}),
+            **({"commands": config.repertoire} if config.repertoire != CLONED else {}),
             "options": _options(config),
             "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
             "cleaning": report,
@@ -200,9 +217,12 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
 
 
 def _options(config: DatasetConfig) -> dict[str, Any]:
-    """A config as the dataset keeps it."""
+    """A config as the dataset keeps it: what is beyond play_on only where it is asked for."""
     options = asdict(config)
     teams = options.pop("teams")
+    for name in ("goalkeepers", "set_plays", "idle"):
+        if not options[name]:
+            del options[name]
     return {"team": teams if len(teams) > 1 else config.team, **options}
 
 
@@ -218,6 +238,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:
         keep=task.commands,
         turn_zero=task.turn_zero,
         goalkeepers=task.goalkeepers,
+        repertoire=task.repertoire,
     )
     types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
     return samples, np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32)
@@ -298,7 +319,7 @@ def _pad_types(types: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
     return padded
 
 
-def _report_match(entry: _Entry, match: MatchSamples, *, split: str) -> dict[str, Any]:
+def _report_match(entry: _Entry, match: MatchSamples, *, split: str, repertoire: Sequence[str]) -> dict[str, Any]:
     return {
         "match_id": entry.match_id,
         "name": entry.name,
@@ -306,7 +327,7 @@ def _report_match(entry: _Entry, match: MatchSamples, *, split: str) -> dict[str
         "side": "left" if entry.side > 0 else "right",
         "split": split,
         "frames": len(match.frames["cycle"]),
-        "rows": _by_kind(np.bincount(match.samples["kind"], minlength=len(CLONED_KINDS))),
+        "rows": _by_kind(np.bincount(match.samples["kind"], minlength=len(repertoire)), repertoire),
         "executed": int(match.samples["executed"].sum()),
         "turn_zero": int(match.samples["turn_zero"].sum()),
         "player_cycles": match.player_cycles,
@@ -316,8 +337,8 @@ def _report_match(entry: _Entry, match: MatchSamples, *, split: str) -> dict[str
     }
 
 
-def _by_kind(counts: Iterable[int]) -> dict[str, int]:
-    return {kind.name.lower(): int(count) for kind, count in zip(CLONED_KINDS, counts, strict=True)}
+def _by_kind(counts: Iterable[int], repertoire: Sequence[str]) -> dict[str, int]:
+    return {name: int(count) for name, count in zip(repertoire, counts, strict=True)}
 
 
 def _report(
@@ -335,7 +356,7 @@ def _report(
             }
             for same in zip(*(match["rules"] for match in matches), strict=True)
         ],
-        "rows": {split.name.lower(): _by_kind(rows[split]) for split in layout.Split},
+        "rows": {split.name.lower(): _by_kind(rows[split], config.repertoire) for split in layout.Split},
         **{
             name: sum(match[name] for match in matches)
             for name in ("executed", "turn_zero", "player_cycles", "idle", "frozen")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -14,9 +14,9 @@ from teamclone.dataset import layout
 from teamclone.logs.align import executed_kind, first_body_commands, slot_of
 from teamclone.logs.columns import counter_name
 from teamclone.logs.match import Columns
-from teamclone.rcss import state_bits
-from teamclone.rcss.commands import BODY_KINDS, CLONED_KINDS, CommandKind
-from teamclone.rcss.playmodes import PlayMode
+from teamclone.rcss import pitch, state_bits
+from teamclone.rcss.commands import BODY_KINDS, CLONED, CommandKind
+from teamclone.rcss.playmodes import SITUATION, PlayMode, Situation
 from teamclone.rcss.reference_frame import rotate_angle, rotate_point
 
 N_TEAM = 11
@@ -84,7 +84,8 @@ class MatchSamples:
         frames: layout.FRAME_ARRAYS without ``match``, only frames that have a sample.
         samples: layout.SAMPLE_ARRAYS without ``split``; ``frame`` counts from this match's first kept frame.
         rules: every cleaning step in order.
-        player_cycles: cycles x field players of the team on the field in play_on.
+        player_cycles: cycles x players of the team on the field, of those players and in those play modes that the
+            samples are of; field players in play_on by default.
         idle: those of them without any body command, and ``frozen`` those among them after a tackle or foul.
     """
 
@@ -106,6 +107,7 @@ def clean_match(
     keep: Commands = Commands.EXECUTED,
     turn_zero: TurnZero = TurnZero.KEEP,
     goalkeepers: bool = False,
+    repertoire: tuple[str, ...] = CLONED,
 ) -> MatchSamples:
     """Cleans and binds the commands of one team in one match.
 
@@ -115,7 +117,12 @@ def clean_match(
         server_params: ranges of the arguments; the server's defaults where one is missing.
         side: the modelled team's, 1 left or -1 right.
         goalkeepers: keep the goalkeeper's commands, too.
+        repertoire: the commands to keep, some of REPERTOIRE. With catch the goalkeeper is modelled as everybody is;
+            with move every play mode of a Situation is taken, not only play_on; with none a cycle without a body
+            command is a sample.
     """
+    everybody, anytime = "catch" in repertoire, "move" in repertoire
+    kinds = [CommandKind[name.upper()] for name in repertoire if name != "none"]
     rules: list[Rule] = []
 
     def narrow(rows: NDArray[np.int64], mask: NDArray[np.bool_], name: str) -> NDArray[np.int64]:
@@ -130,18 +137,24 @@ def clean_match(
     n_frames = len(frames["cycle"])
     frame = commands["frame"][rows]
     rows = narrow(rows, (frame >= 0) & (frame < n_frames - 1), "bound to a frame that has a successor")
-    play_on = frames["playmode"] == PlayMode.PLAY_ON
-    rows = narrow(rows, play_on[commands["frame"][rows]], "in play_on")
+    if anytime:
+        in_play = SITUATION[frames["playmode"]] != Situation.OTHER
+        rows = narrow(rows, in_play[commands["frame"][rows]], "in play_on or around a set play")
+    else:
+        in_play = frames["playmode"] == PlayMode.PLAY_ON
+        rows = narrow(rows, in_play[commands["frame"][rows]], "in play_on")
     slots = slot_of(commands["side"], commands["unum"])
     goalie = (players["state"] & state_bits.GOALIE) != 0
-    of_field = ~goalie[commands["frame"][rows], slots[rows]]
-    rows = narrow(rows, of_field | goalkeepers, "of field players")
-    first = first_body_commands(commands, frames["playmode"], play_on=PlayMode.PLAY_ON)
+    if not everybody:
+        of_field = ~goalie[commands["frame"][rows], slots[rows]]
+        rows = narrow(rows, of_field | goalkeepers, "of field players")
+    first = first_body_commands(commands, frames["playmode"])
     rows = narrow(rows, np.isin(rows, first), "first of the cycle")
     has_command = np.zeros_like(goalie)
     has_command[commands["frame"][rows], slots[rows]] = True
-    rows = narrow(rows, np.isin(commands["kind"][rows], CLONED_KINDS), "dash, turn, kick or tackle")
-    executed = _executed(players, commands, rows, slots)
+    *names, last = (kind.name.lower() for kind in kinds)
+    rows = narrow(rows, np.isin(commands["kind"][rows], kinds), f"{', '.join(names)} or {last}")
+    executed = _executed(players, commands, rows, slots, kinds)
     if keep is Commands.EXECUTED:
         rows, executed = narrow(rows, executed, "executed by the server"), executed[executed]
     is_turn_zero = (commands["kind"][rows] == CommandKind.TURN) & (commands["arg0"][rows] == 0)
@@ -151,27 +164,38 @@ def clean_match(
 
     own = slice(0, N_TEAM) if side > 0 else slice(N_TEAM, 2 * N_TEAM)
     state = players["state"][:-1, own]
-    due = play_on[:-1, None] & ((state & state_bits.STAND) != 0) & ~goalie[:-1, own]
+    due = in_play[:-1, None] & ((state & state_bits.STAND) != 0)
+    if not everybody:
+        due &= ~goalie[:-1, own]
     idle = due & ~has_command[:-1, own]
     frozen = idle & ((state & (state_bits.TACKLE | state_bits.TACKLE_FAULT | state_bits.FOUL_CHARGED)) != 0)
 
-    unum = commands["unum"][rows].astype(np.int64)
-    order = np.lexsort((unum, commands["frame"][rows]))
-    rows, executed, is_turn_zero, unum = rows[order], executed[order], is_turn_zero[order], unum[order]
-    kept, local = np.unique(commands["frame"][rows], return_inverse=True)
     kind_index = np.zeros(max(CommandKind) + 1, np.uint8)
-    kind_index[list(CLONED_KINDS)] = np.arange(len(CLONED_KINDS))
+    kind_index[kinds] = np.arange(len(kinds))
     samples: Columns = {
-        "frame": local.astype(np.int32),
-        "player": (unum - 1).astype(np.uint8),
+        "frame": commands["frame"][rows].astype(np.int64),
+        "player": (commands["unum"][rows] - 1).astype(np.uint8),
         "kind": kind_index[commands["kind"][rows]],
         "parameters": _parameters({name: commands[name][rows] for name in COMMAND_COLUMNS}, server_params),
         "executed": executed,
         "turn_zero": is_turn_zero,
     }
+    if "none" in repertoire and len(commands["kind"]):
+        nothing = _nothing(frames, players)[:-1, own]
+        frame, player = np.nonzero(idle & nothing)
+        added = {"frame": frame, "player": player, "kind": np.full(len(frame), repertoire.index("none"))}
+        samples = {
+            name: np.concatenate(
+                [values, added.get(name, np.zeros((len(frame), *values.shape[1:]))).astype(values.dtype)]
+            )
+            for name, values in samples.items()
+        }
+    order = np.lexsort((samples["player"], samples["frame"]))
+    samples = {name: values[order] for name, values in samples.items()}
+    kept, local = np.unique(samples["frame"], return_inverse=True)
     return MatchSamples(
         frames=_frames(frames, players, kept, side=side),
-        samples=samples,
+        samples={**samples, "frame": local.astype(np.int32)},
         rules=tuple(rules),
         player_cycles=int(due.sum()),
         idle=int(idle.sum()),
@@ -179,12 +203,23 @@ def clean_match(
     )
 
 
+def _nothing(frames: Columns, players: Columns) -> NDArray[np.bool_]:
+    """(n_frames, 22) whether the counters say that a player did nothing: a log that lost commands says so of nobody."""
+    nothing: NDArray[np.bool_] = executed_kind(frames, players) == 0
+    nothing &= players[counter_name(CommandKind.DASH)] >= 0
+    return nothing
+
+
 def _executed(
-    players: Columns, commands: Columns, rows: NDArray[np.int64], slots: NDArray[np.int64]
+    players: Columns,
+    commands: Columns,
+    rows: NDArray[np.int64],
+    slots: NDArray[np.int64],
+    kinds: Sequence[CommandKind],
 ) -> NDArray[np.bool_]:
     """Whether the counter of each command's kind rose between its frame and the next."""
     rose = np.zeros(len(rows), np.bool_)
-    for kind in CLONED_KINDS:
+    for kind in kinds:
         of_kind = commands["kind"][rows] == kind
         frame, slot = commands["frame"][rows][of_kind], slots[rows][of_kind]
         counter = players[counter_name(kind)]
@@ -193,7 +228,7 @@ def _executed(
 
 
 def _parameters(commands: Columns, server_params: Mapping[str, float | str]) -> NDArray[np.float32]:
-    """Arguments as the server uses them (rcss.md 3.1), shape (n, 2): power and degrees, unused ones 0.
+    """Arguments as the server uses them (rcss.md 3.1), shape (n, 2): power, degrees, metres of a move, unused ones 0.
 
     A two-leg dash is given as its sum: the mean of both legs' power vectors, as a power and a direction.
     """
@@ -228,6 +263,11 @@ def _parameters(commands: Columns, server_params: Mapping[str, float | str]) -> 
     values[kick, 1] = np.clip(arg[1][kick], -180.0, 180.0)
     tackle = kind == CommandKind.TACKLE
     values[tackle, 0] = np.clip(arg[0][tackle], -180.0, 180.0)
+    catch = kind == CommandKind.CATCH
+    values[catch, 0] = np.clip(arg[0][catch], limit("min_catch_angle", -180.0), limit("max_catch_angle", 180.0))
+    move = kind == CommandKind.MOVE
+    values[move, 0] = np.clip(arg[0][move], -pitch.MAX_X, pitch.MAX_X)
+    values[move, 1] = np.clip(arg[1][move], -pitch.MAX_Y, pitch.MAX_Y)
     return values.astype(np.float32)
 
 

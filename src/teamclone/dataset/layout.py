@@ -1,6 +1,7 @@
 """A dataset on disk: every frame once, samples that point into the frames, all as memory-mapped .npy arrays.
 
-    DS/dataset.json           format number, team, options, matches with their split, cleaning report
+    DS/dataset.json           format number, team, options, matches with their split, cleaning report; ``commands``,
+                              some of REPERTOIRE, where they are others than CLONED
     DS/frames/<name>.npy      FRAME_ARRAYS, shape (n_frames, ...), matches in order
     DS/samples/<name>.npy     SAMPLE_ARRAYS, shape (n_samples, ...), ordered by frame, then player
     DS/player_types.npy       (n_matches, n_types, n_fields) float32, fields as `player_types.FIELDS`
@@ -111,12 +112,17 @@ FRAME_ARRAYS = (
 SAMPLE_ARRAYS = (
     Array(name="frame", dtype="int32", shape=(), about="index of the frame the command was decided on"),
     Array(name="player", dtype="uint8", shape=(), about="place of the acting player, 0..10 = number 1..11"),
-    Array(name="kind", dtype="uint8", shape=(), about="index into CLONED_KINDS: 0 dash, 1 turn, 2 kick, 3 tackle"),
+    Array(
+        name="kind",
+        dtype="uint8",
+        shape=(),
+        about="index into the dataset's commands: 0 dash, 1 turn, 2 kick, 3 tackle",
+    ),
     Array(
         name="parameters",
         dtype="float32",
         shape=(2,),
-        about="the command's arguments as the server uses them (clipped), power and degrees; unused ones 0",
+        about="the command's arguments as the server uses them (clipped), power, degrees, metres; unused ones 0",
     ),
     Array(name="executed", dtype="bool", shape=(), about="the server executed it: the player's counter rose"),
     Array(name="turn_zero", dtype="bool", shape=(), about='a (turn 0), which means "nothing to do"'),

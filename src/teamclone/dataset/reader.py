@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +30,12 @@ from teamclone.dataset.layout import (
 )
 from teamclone.errors import DatasetError
 from teamclone.models.state import State, Target
-from teamclone.rcss.commands import CLONED_KINDS, CommandKind
+from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.player_types import FIELDS
+from teamclone.rcss.playmodes import OTHER_SIDE
 
 Rows = NDArray[np.int64] | Tensor
 """Indices of samples, (batch,) int64."""
-
-_CLASS_OF_KIND = torch.full((max(CommandKind) + 1,), -1, dtype=torch.int64)
-_CLASS_OF_KIND[torch.tensor(CLONED_KINDS)] = torch.arange(len(CLONED_KINDS))
 
 
 @cache
@@ -45,7 +43,7 @@ def _steps(device: torch.device) -> Tensor:
     return torch.from_numpy(STEPS).to(device)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)  # without slots: `_modes` is kept
 class Dataset:
     """A dataset that has been opened. Its arrays stay on disk; every method reads just the rows it is asked for.
 
@@ -70,6 +68,11 @@ class Dataset:
     def id(self) -> str:
         """A hash of the content: equal for equal datasets, wherever they lie."""
         return str(self.meta["id"])
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """What its samples may be, some of REPERTOIRE in their order."""
+        return tuple(self.meta.get("commands", CLONED))
 
     @property
     def matches(self) -> list[dict[str, Any]]:
@@ -122,7 +125,21 @@ class Dataset:
             past_ball=self.frames["ball"].index_select(0, past).reshape(len(rows), history, 4),
             past_players=self._players(past).reshape(len(rows), history, 22, len(PLAYER_CHANNELS)),
             past_known=known,
+            mode=self._modes[0].index_select(0, frame).long(),
+            mode_cycles=self._modes[1].index_select(0, frame),
         )
+
+    @cached_property
+    def _modes(self) -> tuple[Tensor, Tensor]:
+        """Of every frame the play mode as of `State`, and the frames since it began."""
+        match, mode, cycle = (self.frames[name].long() for name in ("match", "playmode", "cycle"))
+        turned = torch.tensor([of.get("side") == "right" for of in self.matches], device=match.device)[match]
+        other_side = torch.from_numpy(OTHER_SIDE).to(match.device).long()
+        began = torch.ones_like(match, dtype=torch.bool)
+        began[1:] = (match[1:] != match[:-1]) | (mode[1:] != mode[:-1]) | (cycle[1:] > cycle[:-1] + 1)
+        place = torch.arange(len(match), device=match.device)
+        since = place - torch.where(began, place, 0).cummax(0).values
+        return torch.where(turned, other_side[mode], mode).to(torch.uint8), since.to(torch.float32)
 
     def _players(self, frame: Tensor) -> Tensor:
         """(frames, 22, len(PLAYER_CHANNELS)) of some frames."""
@@ -145,12 +162,20 @@ class Dataset:
         )
 
     def last_kind(self, rows: Rows) -> Tensor:
-        """(batch,) int64: what the acting player executed one cycle before, as an index into CLONED_KINDS; -1 none."""
+        """(batch,) int64: what the acting player executed one cycle before, as an index into `commands`; else -1."""
         rows = torch.as_tensor(rows)
         frame = self.samples["frame"].index_select(0, rows)
         actor = self.samples["player"].index_select(0, rows)
         kind = self.frames["code"][frame.long(), actor.long(), CODE["last_command"]].long()
-        return torch.where(kind == NO_CODE, -1, _CLASS_OF_KIND[kind.clamp(max=max(CommandKind))])
+        place = torch.full((NO_CODE + 1,), -1, dtype=torch.int64)
+        for index, name in enumerate(self.commands):
+            place[0 if name == "none" else CommandKind[name.upper()]] = index
+        return place[kind]
+
+    def mode(self, rows: Rows) -> Tensor:
+        """(batch,) int64: the play mode of each sample as of `State`."""
+        frame = self.samples["frame"].index_select(0, torch.as_tensor(rows))
+        return self._modes[0].index_select(0, frame).long()
 
     def match(self, rows: Rows) -> Tensor:
         """(batch,) int64: index of each sample's match in `matches`."""
@@ -181,6 +206,12 @@ def open_dataset(path: Path | str) -> Dataset:
     absent = [key for key in ("id", "team", "matches", "n_frames", "n_samples") if key not in meta]
     if absent:
         raise DatasetError(f"{document}: lacks {', '.join(absent)}; make it again with `teamclone dataset`")
+    commands = tuple(meta.get("commands", CLONED))
+    if commands[: len(CLONED)] != CLONED or commands != tuple(name for name in REPERTOIRE if name in commands):
+        raise DatasetError(
+            f"{document}: expected commands {', '.join(CLONED)} and then, in this order, some of "
+            f"{', '.join(REPERTOIRE[len(CLONED) :])}; got {', '.join(commands)}; make it again with `teamclone dataset`"
+        )
     types = _open(folder / "player_types.npy", dtype="float32", shape=(len(meta["matches"]), None, len(FIELDS)))
     return Dataset(
         path=folder.resolve(),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from teamclone.dataset.layout import CODE, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
 from teamclone.errors import DatasetError
 from teamclone.files import held
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.rcss.commands import CLONED
 from teamclone.rcss.player_types import FIELDS
 
 _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
@@ -78,7 +78,8 @@ class DatasetWriter:
 
         Args:
             player_types: (n_matches, n_types, len(FIELDS)), SI units; unused types of a match as type 0.
-            meta: goes into ``dataset.json``; must hold ``team`` and ``matches``, a list of dictionaries, one per match.
+            meta: goes into ``dataset.json``; must hold ``team`` and ``matches``, a list of dictionaries, one per match,
+                with a ``side`` of "right" where the modelled team was that; and ``commands``, unless they are CLONED.
 
         Raises:
             DatasetError: what was added does not fit together.
@@ -87,7 +88,7 @@ class DatasetWriter:
         if missing:
             raise DatasetError(f"{self._where}: dataset.json needs {', '.join(missing)}")
         types = np.ascontiguousarray(player_types, np.float32)
-        self._check_references(types, len(meta["matches"]))
+        self._check_references(types, len(meta["matches"]), n_commands=len(meta.get("commands", CLONED)))
         array = Array(name="player_types", dtype="float32", shape=types.shape[1:], about="")
         self._files["", array.name] = _ArrayFile(self._folder / f"{array.name}.npy", array)
         self._files["", array.name].append(types)
@@ -110,7 +111,7 @@ class DatasetWriter:
         for file in self._files.values():
             file.close()
 
-    def _check_references(self, types: NDArray[np.float32], n_matches: int) -> None:
+    def _check_references(self, types: NDArray[np.float32], n_matches: int, *, n_commands: int) -> None:
         """Every index points at something: the readers gather without looking."""
         if types.ndim != 3 or types.shape[0] != n_matches or types.shape[2] != len(FIELDS):
             raise DatasetError(
@@ -121,7 +122,7 @@ class DatasetWriter:
             "frames/code type": types.shape[1],
             "samples/frame": self.n_frames,
             "samples/player": 11,
-            "samples/kind": len(CLONED_KINDS),
+            "samples/kind": n_commands,
             "samples/split": len(Split),
         }
         for name, (least, most) in self._ranges.items():

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.evaluation.metrics import IS_ANGLE, N_KINDS, N_PARAMETERS, Counts, Floats
+from teamclone.evaluation.metrics import Counts, Floats
 from teamclone.evaluation.outcome import Outcome
+from teamclone.rcss.commands import CLONED, parameters_of
 
 SMOOTHING = 1.0
 """Added to every count (Laplace), so that what the training matches never showed keeps a probability."""
@@ -24,8 +25,9 @@ class Baselines:
     """Counts of the training rows.
 
     Attributes:
-        transitions: (5, 4) rows with [last executed command, command given]; last place of the first axis: none known.
-        parameters: (6,) the constant guess of each parameter: its median, around the circle for angles; NaN if unseen.
+        transitions: (commands + 1, commands) rows with [last executed command, command given]; last place of the first
+            axis: none known.
+        parameters: (parameters,) the constant guess of each: its median, around the circle for angles; NaN if unseen.
     """
 
     transitions: Counts
@@ -33,13 +35,13 @@ class Baselines:
 
     @property
     def prior(self) -> Floats:
-        """(4,) smoothed share of every command in training."""
+        """(commands,) smoothed share of every command in training."""
         counts = self.transitions.sum(axis=0) + SMOOTHING
         share: Floats = counts / counts.sum()
         return share
 
     def table(self, name: str) -> Floats:
-        """(5, 4) the probabilities a baseline gives after each last command; the last row is for "none known".
+        """(commands + 1, commands) the probabilities a baseline gives after each last command, the last row if unknown.
 
         majority: the prior, whatever came before; its prediction is the most frequent command.
         persistence: the last command with the share of repetitions in training, the rest split by the prior; the
@@ -47,15 +49,16 @@ class Baselines:
         markov: smoothed share of each command after the last one.
         """
         prior = self.prior
+        n_kinds = len(prior)
         if name == "majority":
-            return np.tile(prior, (N_KINDS + 1, 1))
+            return np.tile(prior, (n_kinds + 1, 1))
         if name == "persistence":
-            pairs = self.transitions[:N_KINDS]
+            pairs = self.transitions[:n_kinds]
             repeats = (np.trace(pairs) + SMOOTHING) / (pairs.sum() + 2 * SMOOTHING)
             # It predicts the repetition by definition, so the repetition stays the most probable.
             repeats = max(float(repeats), 0.5)
-            table = np.tile(prior, (N_KINDS + 1, 1))
-            for kind in range(N_KINDS):
+            table = np.tile(prior, (n_kinds + 1, 1))
+            for kind in range(n_kinds):
                 others = prior.copy()
                 others[kind] = 0.0
                 table[kind] = (1.0 - repeats) * others / others.sum()
@@ -81,20 +84,24 @@ class Baselines:
 
 @dataclass(slots=True)
 class Counter:
-    """Counts training rows batch by batch: parameters in steps of one unit or degree, which is all a median needs."""
+    """Counts training rows batch by batch: parameters in whole units, degrees and metres, enough for a median."""
 
+    commands: tuple[str, ...]
     transitions: Counts
     histograms: Counts
 
     @classmethod
-    def empty(cls) -> Counter:
+    def empty(cls, commands: tuple[str, ...] = CLONED) -> Counter:
         """Nothing counted yet."""
+        n_kinds, n_parameters = len(commands), len(parameters_of(commands))
         return cls(
-            transitions=np.zeros((N_KINDS + 1, N_KINDS), np.int64), histograms=np.zeros((N_PARAMETERS, 361), np.int64)
+            commands=commands,
+            transitions=np.zeros((n_kinds + 1, n_kinds), np.int64),
+            histograms=np.zeros((n_parameters, 361), np.int64),
         )
 
     def add(self, *, kind: NDArray[np.integer], last: NDArray[np.integer], issued: NDArray[np.floating]) -> None:
-        """Count rows: kind and last (n,), issued (n, 6) with NaN for parameters of other commands."""
+        """Count rows: kind and last (n,), issued (n, parameters) with NaN for parameters of other commands."""
         np.add.at(self.transitions, (last, kind), 1)
         for index, column in enumerate(issued.T):
             steps = np.rint(column[np.isfinite(column)]).astype(np.int64)
@@ -102,8 +109,9 @@ class Counter:
 
     def finish(self) -> Baselines:
         """The baselines of everything counted."""
+        items = parameters_of(self.commands)
         parameters = np.array(
-            [_median(counts, angle=bool(angle)) for counts, angle in zip(self.histograms, IS_ANGLE, strict=True)]
+            [_median(counts, angle=item.angle) for counts, item in zip(self.histograms, items, strict=True)]
         )
         return Baselines(transitions=self.transitions, parameters=parameters)
 

@@ -6,6 +6,7 @@ import datetime
 import json
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,8 @@ from teamclone.files import write_json
 from teamclone.models.heads import PointHead
 from teamclone.models.network import model_id, parameter_count
 from teamclone.models.state import Target
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
+from teamclone.rcss.commands import CLONED, parameters_of
+from teamclone.rcss.playmodes import RESTARTS, PlayMode
 
 if TYPE_CHECKING:
     from teamclone.models.network import Clone
@@ -40,7 +42,6 @@ POSITIONS_PER_KIND = 2500
 TURN_EDGES = np.arange(-181.5, 182.0, 3.0)
 """Bins of Fig. 6 in degrees; the one in the middle holds 0."""
 
-KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
 SPLITS = (Split.TEST, Split.UNSEEN, Split.VALIDATION)
 
 Progress = Callable[[int, int], None]
@@ -71,7 +72,7 @@ def predict(
     n = len(rows)
     model.eval()
     device = next(model.parameters()).device
-    outcome = _empty(n)
+    outcome, mode = _empty(n, dataset.commands), np.empty(n, np.int64)
     with torch.inference_mode():
         for start in range(0, n, batch):
             part = rows[start : start + batch]
@@ -86,48 +87,53 @@ def predict(
                 likelihood = model.head.log_likelihood(output, target)
                 outcome.parameter_log_loss[start:stop] = -likelihood.float().cpu().numpy()
             kind, issued, last = truth(dataset, part)
+            outcome.parameter_log_loss[start:stop][np.isnan(issued).all(1)] = np.nan
             outcome.probabilities[start:stop] = answer.logits.float().softmax(1).cpu().numpy()
             outcome.parameters[start:stop] = answer.parameters.float().cpu().numpy()
             outcome.kind[start:stop] = kind
             outcome.issued[start:stop] = issued
             outcome.last[start:stop] = last
             outcome.match[start:stop] = dataset.match(part).numpy()
+            mode[start:stop] = dataset.mode(part).numpy()
             frame, actor = dataset.samples["frame"].numpy()[part], dataset.samples["player"].numpy()[part]
             outcome.position[start:stop] = dataset.frames["position"].numpy()[frame, actor]
             if on_batch is not None:
                 on_batch(len(part))
-    return outcome
+    return replace(outcome, mode=mode)
 
 
-def _empty(n: int) -> Outcome:
+def _empty(n: int, commands: tuple[str, ...]) -> Outcome:
+    n_parameters = len(parameters_of(commands))
     return Outcome(
-        probabilities=np.empty((n, len(KINDS)), np.float32),
-        parameters=np.empty((n, len(PARAMETERS)), np.float32),
+        probabilities=np.empty((n, len(commands)), np.float32),
+        parameters=np.empty((n, n_parameters), np.float32),
         parameter_log_loss=np.full(n, np.nan, np.float32),
         kind=np.empty(n, np.int64),
-        issued=np.empty((n, len(PARAMETERS)), np.float32),
+        issued=np.empty((n, n_parameters), np.float32),
         last=np.empty(n, np.int64),
         match=np.empty(n, np.int64),
         position=np.empty((n, 2), np.float32),
+        commands=commands,
     )
 
 
 def truth(
     dataset: Dataset, rows: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64]]:
-    """kind (n,), issued (n, 6) and last (n,) as in `Outcome`, of some samples."""
+    """kind (n,), issued (n, parameters) and last (n,) as in `Outcome`, of some samples."""
     target = dataset.target(rows)
     kind, arguments = target.kind.numpy(), target.parameters.numpy()
-    issued = np.full((len(rows), len(PARAMETERS)), np.nan, np.float32)
-    for column, parameter in enumerate(PARAMETERS):
-        carries = kind == CLONED_KINDS.index(parameter.kind)
+    items = parameters_of(dataset.commands)
+    issued = np.full((len(rows), len(items)), np.nan, np.float32)
+    for column, parameter in enumerate(items):
+        carries = kind == dataset.commands.index(parameter.kind.name.lower())
         issued[carries, column] = arguments[carries, parameter.argument]
     return kind, issued, dataset.last_kind(rows).numpy()
 
 
 def count_training(dataset: Dataset, *, on_batch: Callable[[int], None] | None = None) -> rules.Baselines:
     """What the baselines know: the training split of a dataset, counted."""
-    counter = rules.Counter.empty()
+    counter = rules.Counter.empty(dataset.commands)
     rows = dataset.split(Split.TRAIN)
     for start in range(0, len(rows), 32 * BATCH):
         part = rows[start : start + 32 * BATCH]
@@ -157,7 +163,7 @@ def evaluate(
         on_progress: called with rows done and rows in all.
 
     Raises:
-        DatasetError: the dataset is missing, or has nothing to evaluate.
+        DatasetError: the dataset is missing, has nothing to evaluate, or other commands than the model.
         RunError: the run or checkpoint cannot be read.
     """
     own = _own_dataset(run, needed=dataset is None)
@@ -167,6 +173,11 @@ def evaluate(
     else:
         data = dataset if isinstance(dataset, Dataset) else open_dataset(dataset)
     foreign = own is None or data.id != own.id
+    if data.commands != run.config.model.commands:
+        raise DatasetError(
+            f"{data.path}: has the commands {', '.join(data.commands)}, the model answers with "
+            f"{', '.join(run.config.model.commands)}; make the dataset with the options of that of the run"
+        )
     splits = (*SPLITS, Split.TRAIN) if foreign else SPLITS
     rows = {split: data.split(split) for split in splits}
     rows = {split: index for split, index in rows.items() if len(index)}
@@ -322,13 +333,16 @@ def describe(
         ],
         "model": _scores(point, spread),
         "confusion": total.confusion.astype(int).tolist(),
-        "commands": _commands(total, resampled),
+        "commands": _commands(outcome.commands, total, resampled),
         "parameters": _parameters(outcome, total, resampled),
         "calibration": {
             "predicted_command": _curve(metrics.top_label_curve(total)),
-            "commands": {name: _curve(metrics.command_curve(outcome, kind)) for kind, name in enumerate(KINDS)},
+            "commands": {
+                name: _curve(metrics.command_curve(outcome, kind)) for kind, name in enumerate(outcome.commands)
+            },
         },
         "baselines": {},
+        **_situations(outcome),
         "opponents": _opponents(used, by_entry, matches, seed=seed),
     }
     for name in rules.NAMES:
@@ -346,9 +360,9 @@ def describe(
         # Made for networks that answer zero for parameters not issued; of a constant guess it says nothing.
         del section["baselines"][name]["paper_mae"]
     guess = baselines.answer("majority", outcome)
-    medians = metrics.median_errors(guess.parameters, guess.issued)
+    medians = metrics.median_errors(guess.parameters, guess.issued, guess.commands)
     means = metrics.ratio(metrics.measure(guess)[1].total().parameter_error, total.parameter_count)
-    for index, parameter in enumerate(PARAMETERS):
+    for index, parameter in enumerate(parameters_of(outcome.commands)):
         constant = {
             "guess": number(baselines.parameters[index]),
             "mean": number(means[index]),
@@ -356,6 +370,27 @@ def describe(
         }
         section["parameters"][parameter.name]["constant"] = constant
     return section
+
+
+def _situations(outcome: Outcome) -> dict[str, Any]:
+    """``situations``: rows, accuracy and cross-entropy in play_on and by who restarts; nothing where all is play_on."""
+    if outcome.mode is None or (outcome.mode == PlayMode.PLAY_ON).all():
+        return {}
+    restarts = RESTARTS[outcome.mode]
+    masks = {
+        "play_on": outcome.mode == PlayMode.PLAY_ON,
+        "own restart": restarts > 0,
+        "their restart": restarts < 0,
+    }
+    table = {}
+    for name, mask in masks.items():
+        point = metrics.scores(metrics.measure(outcome.rows(mask))[1].total())
+        table[name] = {
+            "rows": int(mask.sum()),
+            "accuracy": number(point.accuracy),
+            "cross_entropy": number(point.cross_entropy),
+        }
+    return {"situations": table}
 
 
 def _gain(model: Scores, other: Scores) -> tuple[Any, Any]:
@@ -387,7 +422,7 @@ def _match(entries: Sequence[dict[str, Any]], sums: Sums) -> dict[str, Any]:
     }
 
 
-def _commands(total: Sums, resampled: Sums | None) -> dict[str, Any]:
+def _commands(commands: Sequence[str], total: Sums, resampled: Sums | None) -> dict[str, Any]:
     point = metrics.rates(total.confusion)
     spread = metrics.rates(resampled.confusion) if resampled is not None else None
     losses = metrics.ratio(total.parameter_log_loss, total.likelihood_count)
@@ -396,7 +431,7 @@ def _commands(total: Sums, resampled: Sums | None) -> dict[str, Any]:
     )
     counts = ("support", "predicted")
     table: dict[str, Any] = {}
-    for kind, name in enumerate(KINDS):
+    for kind, name in enumerate(commands):
         row: dict[str, Any] = {field: int(getattr(point, field)[kind]) for field in counts}
         for field in point._fields:
             if field not in counts:
@@ -410,7 +445,7 @@ def _commands(total: Sums, resampled: Sums | None) -> dict[str, Any]:
 def _parameters(outcome: Outcome, total: Sums, resampled: Sums | None) -> dict[str, Any]:
     means = metrics.ratio(total.parameter_error, total.parameter_count)
     spread = metrics.ratio(resampled.parameter_error, resampled.parameter_count) if resampled is not None else None
-    medians = metrics.median_errors(outcome.parameters, outcome.issued)
+    medians = metrics.median_errors(outcome.parameters, outcome.issued, outcome.commands)
     right = outcome.rows(outcome.probabilities.argmax(axis=1) == outcome.kind)
     _, sums = metrics.measure(right)
     when_right = metrics.ratio(sums.total().parameter_error, sums.total().parameter_count)
@@ -423,7 +458,7 @@ def _parameters(outcome: Outcome, total: Sums, resampled: Sums | None) -> dict[s
             "median": number(medians[index]),
             "mean_when_command_right": number(when_right[index]),
         }
-        for index, parameter in enumerate(PARAMETERS)
+        for index, parameter in enumerate(parameters_of(outcome.commands))
     }
 
 
@@ -463,9 +498,10 @@ def _opponents(
 def characterise(dataset: Dataset, *, seed: int = 0) -> dict[str, Any]:
     """What the rows look like: commands by split, turn moments, where each command was given (Figs 4 to 6)."""
     kinds, splits = dataset.samples["kind"].numpy(), dataset.samples["split"].numpy()
-    square = np.bincount(splits.astype(np.int64) * len(KINDS) + kinds, minlength=len(Split) * len(KINDS))
-    by_split = square.reshape(len(Split), len(KINDS))
-    turns = np.flatnonzero(kinds == CLONED_KINDS.index(CommandKind.TURN))
+    names = dataset.commands
+    square = np.bincount(splits.astype(np.int64) * len(names) + kinds, minlength=len(Split) * len(names))
+    by_split = square.reshape(len(Split), len(names))
+    turns = np.flatnonzero(kinds == CLONED.index("turn"))
     histogram = np.zeros(len(TURN_EDGES) - 1, np.int64)
     zero = 0
     arguments, turn_zero = dataset.samples["parameters"].numpy(), dataset.samples["turn_zero"].numpy()
@@ -474,7 +510,7 @@ def characterise(dataset: Dataset, *, seed: int = 0) -> dict[str, Any]:
         zero += int(turn_zero[part].sum())
     generator = np.random.default_rng(seed)
     places: dict[str, list[list[float]]] = {}
-    for kind, name in enumerate(KINDS):
+    for kind, name in enumerate(names):
         rows = np.flatnonzero(kinds == kind)
         if len(rows) > POSITIONS_PER_KIND:
             rows = np.sort(generator.choice(rows, POSITIONS_PER_KIND, replace=False))
@@ -485,7 +521,7 @@ def characterise(dataset: Dataset, *, seed: int = 0) -> dict[str, Any]:
         "rows": len(dataset),
         "matches": len({match["match_id"] for match in dataset.matches}),
         "commands_by_split": {
-            split.name.lower(): dict(zip(KINDS, by_split[split].tolist(), strict=True)) for split in Split
+            split.name.lower(): dict(zip(names, by_split[split].tolist(), strict=True)) for split in Split
         },
         "turns": len(turns),
         "turn_zero": zero,

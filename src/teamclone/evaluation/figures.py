@@ -17,13 +17,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from teamclone.evaluation.pitch import draw_pitch
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.rcss.commands import CLONED, REPERTOIRE
 
-KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
+KINDS = CLONED
 
 INK, MUTED, RULE, ACCENT, SECOND = "#010203", "#010204", "#010205", "#010206", "#010207"
 _STAND_INS = {INK: "ink", MUTED: "muted", RULE: "rule", ACCENT: "accent", SECOND: "second"}
-KIND_COLOURS = {"dash": "#3d85c6", "turn": "#dd8a1b", "kick": "#1f9e78", "tackle": "#c75b9b"}
+KIND_COLOURS = {
+    **{"dash": "#3d85c6", "turn": "#dd8a1b", "kick": "#1f9e78", "tackle": "#c75b9b"},
+    **{"catch": "#8a6fd1", "move": "#a3862a", "none": "#7d8791"},
+}
 """Also legible where they cannot follow the page: in rasterised dots."""
 
 PERCENT = "\N{NARROW NO-BREAK SPACE}%"
@@ -88,11 +91,20 @@ def _figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> t
     return figure, figure.subplots(rows, columns, **options)
 
 
+def _kinds(given: Mapping[str, Any]) -> list[str]:
+    """KINDS, and whatever other commands there are."""
+    return [kind for kind in REPERTOIRE if kind in KINDS or kind in given]
+
+
 @mpl.rc_context(_STYLE)
 def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[str, int]) -> Figure:
     """Fig. 4: where each command was given, one pitch per command, a sample of points (n, 2) in metres."""
-    figure, grid = _figure(5.5, 2, 2)
-    for axes, kind in zip(grid.flat, KINDS, strict=True):
+    kinds = _kinds(points)
+    rows = math.ceil(len(kinds) / 2)
+    figure, grid = _figure(2.75 * rows, rows, 2)
+    for axes in grid.flat[len(kinds) :]:
+        axes.set_visible(False)
+    for axes, kind in zip(grid.flat, kinds, strict=False):
         draw_pitch(axes, colour=MUTED, width=0.7)
         spots = np.asarray(points.get(kind, []), float).reshape(-1, 2)
         crowd = float(np.clip(300.0 / max(len(spots), 1), 0.3, 0.9))
@@ -104,10 +116,11 @@ def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[s
 @mpl.rc_context(_STYLE)
 def frequencies(counts: Mapping[str, int]) -> Figure:
     """Fig. 5: commands by kind."""
-    figure, axes = _figure(1.75)
+    kinds = _kinds(counts)
+    figure, axes = _figure(1.75 * len(kinds) / len(KINDS))
     total = max(sum(counts.values()), 1)
-    values = [counts.get(kind, 0) for kind in KINDS]
-    axes.barh(KINDS, values, color=[KIND_COLOURS[kind] for kind in KINDS], height=0.62)
+    values = [counts.get(kind, 0) for kind in kinds]
+    axes.barh(kinds, values, color=[KIND_COLOURS[kind] for kind in kinds], height=0.62)
     for place, value in enumerate(values):
         axes.annotate(
             f"{value:,}  ({100 * value / total:.2f}{PERCENT})",
@@ -266,8 +279,7 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
     left.set_title("the predicted command")
     left.set_xlabel("probability said")
     left.set_ylabel("share that came true")
-    for kind in KINDS:
-        curve = calibration["commands"][kind]
+    for kind, curve in calibration["commands"].items():
         if sum(curve["rows"]):
             right.plot(
                 curve["said"], curve["came_true"], color=KIND_COLOURS[kind], marker="o", markersize=3, label=kind

@@ -8,47 +8,49 @@ a thousand bootstrap resamples at once (`evaluation.bootstrap`).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.evaluation.outcome import Outcome
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+from teamclone.rcss.commands import CLONED, parameters_of
 from teamclone.rcss.reference_frame import wrap_degrees
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-N_KINDS = len(CLONED_KINDS)
-N_PARAMETERS = len(PARAMETERS)
 CALIBRATION_BINS = 15
-LIMITS: Floats = np.array([parameter.limit for parameter in PARAMETERS])
-IS_ANGLE: NDArray[np.bool_] = np.array([parameter.angle for parameter in PARAMETERS])
-EVEN_LOG_LOSS: Floats = np.array(
-    [
-        sum(math.log(2 * item.limit if item.angle else item.limit) for item in PARAMETERS if item.kind is kind)
-        for kind in CLONED_KINDS
-    ]
-)
-"""(4,) what an even guess over the whole range of a command's parameters has as `Outcome.parameter_log_loss`."""
+
+
+def even_log_loss(commands: Sequence[str]) -> dict[str, float]:
+    """What an even guess over the whole range of a command's parameters has as `Outcome.parameter_log_loss`."""
+    return {
+        name: sum(
+            math.log(item.limit if item.unit == "power" else 2 * item.limit)
+            for item in parameters_of(tuple(commands))
+            if item.kind.name.lower() == name
+        )
+        for name in commands
+    }
 
 
 class Sums(NamedTuple):
     """What every figure is computed from. Leading axes (...) are matches or resamples; none for a total.
 
     Attributes:
-        confusion: (..., 4, 4) rows with [command given, command predicted].
+        confusion: (..., commands, commands) rows with [command given, command predicted].
         log_loss: (...) sum of -ln(probability of the command given), nats.
         brier: (...) sum of squared distances between probabilities and what happened, 0 to 2 a row.
         bin_count: (..., bins) rows by confidence in the predicted command.
         bin_confidence: (..., bins) their summed confidence.
         bin_hits: (..., bins) those predicted right.
-        parameter_count: (..., 6) commands that carried the parameter.
-        parameter_error: (..., 6) their summed absolute error in power and circular degrees.
-        likelihood_count: (..., 4) rows of each command given whose parameters got a likelihood.
-        parameter_log_loss: (..., 4) their summed -ln likelihood, nats.
-        paper_error: (...) sum over rows of the mean over all six outputs, as the paper took it.
+        parameter_count: (..., parameters) commands that carried the parameter.
+        parameter_error: (..., parameters) their summed absolute error in power, circular degrees and metres.
+        likelihood_count: (..., commands) rows of each command given whose parameters got a likelihood.
+        parameter_log_loss: (..., commands) their summed -ln likelihood, nats.
+        paper_error: (...) sum over rows of the mean over all outputs, as the paper took it.
     """
 
     confusion: Floats
@@ -72,10 +74,12 @@ class Sums(NamedTuple):
         return Sums(*(values.sum(axis=0) for values in self))
 
 
-def confusion_matrix(kind: NDArray[np.integer], predicted: NDArray[np.integer]) -> Counts:
-    """(4, 4) rows with [command given, command predicted], from (n,) indices into CLONED_KINDS."""
-    counts = np.bincount(kind * N_KINDS + predicted, minlength=N_KINDS * N_KINDS)
-    return counts.astype(np.int64).reshape(N_KINDS, N_KINDS)
+def confusion_matrix(
+    kind: NDArray[np.integer], predicted: NDArray[np.integer], *, n_kinds: int = len(CLONED)
+) -> Counts:
+    """(n_kinds, n_kinds) rows with [command given, command predicted], from (n,) indices of commands."""
+    counts = np.bincount(kind * n_kinds + predicted, minlength=n_kinds * n_kinds)
+    return counts.astype(np.int64).reshape(n_kinds, n_kinds)
 
 
 def log_loss(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
@@ -86,32 +90,38 @@ def log_loss(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> 
 
 
 def brier(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
-    """(n,) squared distance to the one-hot truth, summed over the four commands (Brier 1950): 0 best, 2 worst."""
+    """(n,) squared distance to the one-hot truth, summed over the commands (Brier 1950): 0 best, 2 worst."""
     distance = probabilities.astype(np.float64)
     distance[np.arange(len(kind)), kind] -= 1.0
     squared: Floats = np.square(distance).sum(axis=1)
     return squared
 
 
-def parameter_errors(predicted: NDArray[np.floating], issued: NDArray[np.floating]) -> Floats:
-    """(n, 6) absolute errors in power units and in degrees around the circle; NaN where nothing was issued.
+def parameter_errors(
+    predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
+) -> Floats:
+    """(n, parameters) absolute errors in power, degrees around the circle and metres; NaN where nothing was issued.
 
     Around the circle 179 and -179 degrees are 2 degrees apart.
     """
     difference = predicted.astype(np.float64) - issued.astype(np.float64)
-    difference[:, IS_ANGLE] = wrap_degrees(difference[:, IS_ANGLE])
+    is_angle = [item.angle for item in parameters_of(commands)]
+    difference[:, is_angle] = wrap_degrees(difference[:, is_angle])
     error: Floats = np.abs(difference)
     return error
 
 
-def paper_errors(predicted: NDArray[np.floating], issued: NDArray[np.floating]) -> Floats:
-    """(n,) the paper's regression error: the mean over six outputs in [-1, 1], zero expected where nothing was issued.
+def paper_errors(
+    predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
+) -> Floats:
+    """(n,) the paper's regression error: the mean over all outputs in [-1, 1], zero expected where nothing was issued.
 
     Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it says little about
     the error of a command's parameter; it is here to be compared with the published 0.069.
     """
-    wanted = np.nan_to_num(issued.astype(np.float64)) / LIMITS
-    error: Floats = np.abs(predicted.astype(np.float64) / LIMITS - wanted).mean(axis=1)
+    limits = np.array([item.limit for item in parameters_of(commands)])
+    wanted = np.nan_to_num(issued.astype(np.float64)) / limits
+    error: Floats = np.abs(predicted.astype(np.float64) / limits - wanted).mean(axis=1)
     return error
 
 
@@ -134,11 +144,11 @@ def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, S
     """
     edges = confidence_edges(outcome.probabilities) if edges is None else edges
     matches, code = np.unique(outcome.match, return_inverse=True)
-    n_matches, n_bins = len(matches), len(edges) + 1
+    n_matches, n_bins, n_kinds = len(matches), len(edges) + 1, len(outcome.commands)
     predicted = outcome.probabilities.argmax(axis=1)
     confidence = outcome.probabilities.max(axis=1).astype(np.float64)
     cell = code * n_bins + np.searchsorted(edges, confidence, side="right")
-    error = parameter_errors(outcome.parameters, outcome.issued)
+    error = parameter_errors(outcome.parameters, outcome.issued, outcome.commands)
     known = np.isfinite(outcome.issued)
     likely = np.isfinite(outcome.parameter_log_loss)
 
@@ -150,11 +160,11 @@ def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, S
         return sums.astype(np.float64).reshape(n_matches, n_bins)
 
     def by_kind(values: NDArray[np.generic]) -> Floats:
-        sums = np.bincount(code * N_KINDS + outcome.kind, weights=values, minlength=n_matches * N_KINDS)
-        return sums.astype(np.float64).reshape(n_matches, N_KINDS)
+        sums = np.bincount(code * n_kinds + outcome.kind, weights=values, minlength=n_matches * n_kinds)
+        return sums.astype(np.float64).reshape(n_matches, n_kinds)
 
-    square = (code * N_KINDS + outcome.kind) * N_KINDS + predicted
-    confusion = np.bincount(square, minlength=n_matches * N_KINDS**2).reshape(n_matches, N_KINDS, N_KINDS)
+    square = (code * n_kinds + outcome.kind) * n_kinds + predicted
+    confusion = np.bincount(square, minlength=n_matches * n_kinds**2).reshape(n_matches, n_kinds, n_kinds)
     sums = Sums(
         confusion=confusion.astype(np.float64),
         log_loss=by_match(log_loss(outcome.probabilities, outcome.kind)),
@@ -166,7 +176,7 @@ def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, S
         parameter_error=np.stack([by_match(column) for column in np.where(known, error, 0.0).T], axis=1),
         likelihood_count=by_kind(likely),
         parameter_log_loss=by_kind(np.where(likely, outcome.parameter_log_loss, 0.0)),
-        paper_error=by_match(paper_errors(outcome.parameters, outcome.issued)),
+        paper_error=by_match(paper_errors(outcome.parameters, outcome.issued, outcome.commands)),
     )
     return matches.astype(np.int64), sums
 
@@ -179,7 +189,7 @@ def ratio(numerator: NDArray[np.number], denominator: NDArray[np.number]) -> Flo
 
 
 class Rates(NamedTuple):
-    """Per command, (..., 4): of a confusion matrix with TP, FP, FN, TN counted one command against the rest.
+    """Per command, (..., commands): of a confusion matrix with TP, FP, FN, TN counted one command against the rest.
 
     Attributes:
         support: rows where the command was given, TP + FN.
@@ -205,7 +215,7 @@ class Rates(NamedTuple):
 
 
 def rates(confusion: NDArray[np.number]) -> Rates:
-    """Rates per command of (..., 4, 4) confusion matrices; NaN where undefined."""
+    """Rates per command of (..., commands, commands) confusion matrices; NaN where undefined."""
     confusion = np.asarray(confusion, np.float64)
     hits = np.diagonal(confusion, axis1=-2, axis2=-1)
     support, predicted = confusion.sum(axis=-1), confusion.sum(axis=-2)
@@ -233,12 +243,12 @@ class Scores(NamedTuple):
     Attributes:
         accuracy: share of rows whose command was predicted right.
         cross_entropy: mean -ln(probability of the command given), nats.
-        brier: mean Brier score over the four commands, 0 to 2.
+        brier: mean Brier score over the commands, 0 to 2.
         ece: expected calibration error: |confidence - accuracy| averaged over confidence bins by their rows
             (Naeini et al. 2015, top label, bins of equal mass).
         balanced_accuracy: mean recall over the commands that occur.
         macro_f1: mean F1 over the commands that occur.
-        paper_mae: the paper's mean absolute error over all six normalised outputs, zeros included.
+        paper_mae: the paper's mean absolute error over all normalised outputs, zeros included.
     """
 
     accuracy: Floats
@@ -304,10 +314,12 @@ def command_curve(outcome: Outcome, kind: int, bins: int = CALIBRATION_BINS) -> 
     )
 
 
-def median_errors(predicted: NDArray[np.floating], issued: NDArray[np.floating]) -> Floats:
-    """(6,) median absolute error of the commands that carried each parameter; NaN where none did."""
-    error = parameter_errors(predicted, issued)
-    medians = np.full(N_PARAMETERS, np.nan)
+def median_errors(
+    predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
+) -> Floats:
+    """(parameters,) median absolute error of the commands that carried each parameter; NaN where none did."""
+    error = parameter_errors(predicted, issued, commands)
+    medians = np.full(error.shape[1], np.nan)
     for index, column in enumerate(error.T):
         known = column[np.isfinite(column)]
         if len(known):

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from teamclone.rcss.commands import CLONED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,15 +16,17 @@ class Outcome:
     """One split of a dataset with a model's answers; n rows.
 
     Attributes:
-        probabilities: (n, 4) over CLONED_KINDS.
-        parameters: (n, 6) predicted PARAMETERS, in power and degrees.
+        probabilities: (n, commands).
+        parameters: (n, parameters) predicted `parameters_of` the commands, in power, degrees and metres.
         parameter_log_loss: (n,) -ln of the likelihood of the given command's parameters, nats, per unit of power and
-            degree; NaN from what answers with points.
-        kind: (n,) the command given, index into CLONED_KINDS.
-        issued: (n, 6) PARAMETERS of the command given, in power and degrees; NaN for those of other commands.
-        last: (n,) the player's last executed command as an index into CLONED_KINDS; -1 for none of them.
+            degree, square metre of a move; NaN from what answers with points, and of commands without parameters.
+        kind: (n,) the command given, index into ``commands``.
+        issued: (n, parameters) those of the command given; NaN for those of other commands.
+        last: (n,) the player's last executed command as an index into ``commands``; -1 for none of them.
         match: (n,) index of the match.
         position: (n, 2) where the player stood, metres, his team attacking +x.
+        mode: (n,) play mode as of `State`; None where all is play_on.
+        commands: some of REPERTOIRE.
     """
 
     probabilities: NDArray[np.float32]
@@ -32,10 +37,14 @@ class Outcome:
     last: NDArray[np.int64]
     match: NDArray[np.int64]
     position: NDArray[np.float32]
+    mode: NDArray[np.int64] | None = None
+    commands: tuple[str, ...] = CLONED
 
     def __len__(self) -> int:
         return len(self.kind)
 
     def rows(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Outcome:
         """The outcome of some rows only, by boolean mask or by number."""
-        return replace(self, **{field.name: getattr(self, field.name)[index] for field in fields(self)})
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        some: dict[str, Any] = {name: of[index] for name, of in columns.items() if isinstance(of, np.ndarray)}
+        return replace(self, **some)

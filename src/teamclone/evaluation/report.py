@@ -18,11 +18,9 @@ from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evalua
 from teamclone.evaluation.latency import load_bench, measure_latency
 from teamclone.files import write_atomic, write_json
 from teamclone.models.network import model_id
-from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
 
-KINDS = tuple(kind.name.lower() for kind in CLONED_KINDS)
 NOTHING = "\N{EN DASH}"
 SPLIT_NAMES = {
     "train": "training matches of another dataset",
@@ -39,6 +37,7 @@ FIGURES = (
     ("macro_f1", "macro F1", "mean F1 of the commands"),
     ("paper_mae", "the paper's MAE", "mean absolute error of all six outputs, zeros included"),
 )
+PITCHES = {4: "Four", 5: "Five", 6: "Six", 7: "Seven"}
 PERCENT = {"accuracy", "balanced_accuracy", "ece"}
 
 
@@ -292,15 +291,16 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
     """The figures by name; those without data are missing."""
     data, splits = evaluation["data"], evaluation["splits"]
     team = evaluation["dataset"]["team"]
-    totals = {kind: sum(counts[kind] for counts in data["commands_by_split"].values()) for kind in KINDS}
+    kinds = tuple(data["positions"])
+    totals = {kind: sum(counts[kind] for counts in data["commands_by_split"].values()) for kind in kinds}
     drawn: dict[str, Any] = {
         "positions": (
             figures.positions(data["positions"], totals),
-            f"Four pitches, one per command, with dots where players of {team} gave it",
+            f"{PITCHES[len(kinds)]} pitches, one per command, with dots where players of {team} gave it",
         ),
         "frequencies": (
             figures.frequencies(totals),
-            "Bars of commands by kind: " + ", ".join(f"{kind} {totals[kind]:,}" for kind in KINDS),
+            "Bars of commands by kind: " + ", ".join(f"{kind} {totals[kind]:,}" for kind in kinds),
         ),
         "turn-moments": (
             figures.turn_moments(
@@ -377,8 +377,9 @@ def render(
         split_names=SPLIT_NAMES,
         figures=FIGURES,
         percents=PERCENT,
-        kinds=KINDS,
-        even_log_loss=dict(zip(KINDS, map(float, metrics.EVEN_LOG_LOSS), strict=True)),
+        kinds=tuple(section["commands"]),
+        colours=figures.KIND_COLOURS,
+        even_log_loss=metrics.even_log_loss(tuple(section["commands"])),
         support=support,
         sentences=sentences(evaluation),
         ladder=ladder(evaluation),

@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 from teamclone.logs.columns import counter_name
 from teamclone.logs.match import N_PLAYERS, Columns
 from teamclone.rcss.commands import BODY_KINDS, CommandKind
+from teamclone.rcss.playmodes import MOVE_MODES
 
 _STOPPAGES = 1 << 20
 
 _IS_BODY = np.zeros(256, np.bool_)
 _IS_BODY[list(BODY_KINDS)] = True
+_MAY_MOVE = np.zeros(256, np.bool_)
+_MAY_MOVE[list(MOVE_MODES)] = True
 
 
 def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, has_stoppage: bool) -> NDArray[np.int32]:
@@ -51,31 +54,30 @@ def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
     return slot
 
 
-def body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
+def body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Indices of the players' commands that would take a body slot of their frame if it were free, in log order.
 
-    A ``move`` during play_on leaves the slot free, an invalid command never takes it. Arguments as of
-    ``first_body_commands``.
+    A ``move`` in a play mode that does not allow it leaves the slot free, an invalid command never takes it. Arguments
+    as of ``first_body_commands``.
     """
     body = _IS_BODY.take(commands["kind"])
     body &= commands["valid"]
     body &= commands["frame"] >= 0
     body &= commands["unum"] > 0
     index = np.flatnonzero(body)
-    mode = playmode[commands["frame"][index]]
-    taking: NDArray[np.int64] = index[~((commands["kind"][index] == CommandKind.MOVE) & (mode == play_on))]
+    may_move = _MAY_MOVE[playmode[commands["frame"][index]]]
+    taking: NDArray[np.int64] = index[(commands["kind"][index] != CommandKind.MOVE) | may_move]
     return taking
 
 
-def first_body_commands(commands: Columns, playmode: NDArray[np.uint8], *, play_on: int) -> NDArray[np.int64]:
+def first_body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Indices of the commands that take the body slot: the first of each frame and player (rcss.md 3.2).
 
     Args:
         commands: with ``frame``, ``side``, ``unum``, ``kind``, ``valid``, in log order.
         playmode: (n_frames,) of the match.
-        play_on: id of the play mode in which ``move`` is not allowed.
     """
-    index = body_commands(commands, playmode, play_on=play_on)
+    index = body_commands(commands, playmode)
     slot = slot_of(commands["side"][index], commands["unum"][index])
     key = commands["frame"][index].astype(np.int64) * N_PLAYERS + slot
     first = np.full(len(playmode) * N_PLAYERS, -1, np.int64)

@@ -304,7 +304,7 @@ def _senders(rcl: _Source) -> set[str]:
 def _foreign(game: GameLog, log: CommandLog) -> bool:
     """Whether the server executed hardly any of the logged commands, so that the logs are of two matches."""
     commands = log.commands
-    index = first_body_commands(commands, game.frames["playmode"], play_on=PlayMode.PLAY_ON)
+    index = first_body_commands(commands, game.frames["playmode"])
     frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
     executed = executed_kind(game.frames, game.players)
     sent = np.zeros_like(executed)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from teamclone.rcss.commands import CLONED
+
 FEATURE_SETS = ("paper", "relative")
 """Sets of inputs; the modules are `features.PaperFeatures` and `relative.RelativeFeatures`."""
-BLOCKS = ("self", "role", "type", "last", "view", "ball", "reach", "lines", "mates", "opponents", "rivals", "past")
+BLOCKS = (
+    "self", "role", "type", "last", "view", "ball", "reach", "lines", "mates", "opponents", "rivals", "past", "mode",
+)  # fmt: skip
 """Blocks of the relative inputs, in the order of their columns; see `relative.RelativeFeatures`."""
 HEADS = ("point", "mixture")
 """Forms of the answer: the paper's point, or a distribution of every parameter."""
@@ -37,6 +41,7 @@ class ModelConfig:
         activation: see `ACTIVATIONS`.
         dropout: share of the hidden units left out at random in training.
         head: see `HEADS`; mixture needs the relative inputs.
+        commands: what it answers with, some of REPERTOIRE in their order: those of the datasets that it is for.
         members: networks that learn side by side over the same inputs and answer together.
     """
 
@@ -55,4 +60,5 @@ class ModelConfig:
     activation: str = "relu"
     dropout: float = 0.0
     head: str = "point"
+    commands: tuple[str, ...] = CLONED
     members: int = 1

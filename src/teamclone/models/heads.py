@@ -11,11 +11,12 @@ from torch import Tensor, nn
 
 from teamclone.models import mixture
 from teamclone.models.kicks import Kicks
-from teamclone.models.loss import LIMITS, Balance, Loss, ParameterLoss, mixture_loss, point_loss
-from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
+from teamclone.models.loss import Balance, Loss, ParameterLoss, mixture_loss, on, point_loss
+from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_PLACE, LEAST_POWER, Mixture, wrap
 from teamclone.models.relative import geometry_of
 from teamclone.models.state import Target
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
+from teamclone.rcss import pitch
+from teamclone.rcss.commands import CLONED, parameters_of
 
 INCOMES = 6
 """Components of dash power that are a learned multiple of what the player recovers in a cycle."""
@@ -25,13 +26,23 @@ DASH_DIRECTIONS = 24
 """Classes of dash direction, 15 degrees apart."""
 TACKLE_DIRECTIONS = 40
 """Classes of tackle direction, 9 degrees apart."""
+CATCH_DIRECTIONS = 40
+"""Classes of catch direction, 9 degrees apart."""
+CATCH_EDGE_DEG = 22.6
+"""Angle from the middle of the catch area to its far corners, 1.2 m ahead and 0.5 m aside."""
+CATCH_LIMIT_DEG = 90.0
+"""To which the server clips the direction of a catch (since version 17)."""
+MOVE_PLACES = tuple((x, y) for x in (-45.0, -30.0, -15.0, -5.0) for y in (-12.0, 12.0))
+"""Where the components of a move begin to learn, metres: places of the own half."""
+MOVE_REACH_M = 10.0
+"""How far from there one goes for an output of 1."""
 AIM_SCALE_DEG = 4.0
 """Scale of the bell by which a turn teaches the aims that are near its direction."""
 
 
 class Prediction(NamedTuple):
-    """One answer per situation: ``logits`` (batch, 4) over CLONED_KINDS, ``parameters`` (batch, 6) PARAMETERS in
-    power and degrees, each as it would be if its command were given."""
+    """One answer per situation: ``logits`` (batch, commands), ``parameters`` (batch, parameters) in power, degrees and
+    metres, each as it would be if its command were given."""
 
     logits: Tensor
     parameters: Tensor
@@ -63,7 +74,7 @@ class Situation(NamedTuple):
 
 
 class PointHead(nn.Module):
-    """The paper's two heads: a softmax over four commands, six parameters bounded by tanh.
+    """The paper's two heads: a softmax over the commands, by default four, their parameters, then six, bounded by tanh.
 
     Attributes:
         temperature: () what the logits are divided by in an answer, not in training; see `training.calibration`.
@@ -72,31 +83,33 @@ class PointHead(nn.Module):
     limits: Tensor
     temperature: Tensor
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, commands: tuple[str, ...] = CLONED) -> None:
         super().__init__()
-        self.command = nn.Linear(width, len(CLONED_KINDS))
-        self.parameter = nn.Linear(width, len(PARAMETERS))
-        self.register_buffer("limits", LIMITS.clone(), persistent=False)
+        self.commands = commands
+        self.command = nn.Linear(width, len(commands))
+        self.parameter = nn.Linear(width, len(parameters_of(commands)))
+        self.register_buffer("limits", on(torch.device("cpu"), commands)[0].clone(), persistent=False)
         self.register_buffer("temperature", torch.ones(()))
 
     def forward(self, seen: Tensor | Situation) -> tuple[Tensor, Tensor]:
-        """Logits (batch, 4) and parameters in [-1, 1], (batch, 6)."""
+        """Logits (batch, commands) and parameters in [-1, 1], (batch, parameters)."""
         hidden = seen.hidden if isinstance(seen, Situation) else seen
         # Out of autocast's bfloat16: a degree is 1/180, finer than its steps near 1.
         return self.command(hidden).float(), torch.tanh(self.parameter(hidden).float())
 
-    @staticmethod
-    def merged(outputs: Sequence[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
+    def merged(self, outputs: Sequence[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
         """The answers of several heads as one: mean probabilities, of each parameter the one nearest to all."""
         logits, projected = zip(*outputs, strict=True)
         values = torch.stack(projected, 2) * math.pi
         even = torch.zeros_like(values[:, 0])
-        chosen = [mixture.middle(even, values[:, i], angle=of.angle) for i, of in enumerate(PARAMETERS)]
+        chosen = [
+            mixture.middle(even, values[:, i], angle=of.angle) for i, of in enumerate(parameters_of(self.commands))
+        ]
         return mean_logits(logits), torch.stack(chosen, 1) / math.pi
 
     @staticmethod
     def logits(output: tuple[Tensor, Tensor]) -> Tensor:
-        """(batch, 4) as they are trained, before the temperature."""
+        """(batch, commands) as they are trained, before the temperature."""
         return output[0]
 
     def point(self, output: tuple[Tensor, Tensor]) -> Prediction:
@@ -118,7 +131,14 @@ class PointHead(nn.Module):
         """The paper's; ``aim_weight`` does not apply."""
         logits, projected = output
         return point_loss(
-            logits, projected, target, parameter_loss=parameter_loss, weight=weight, balance=balance, whole=whole
+            logits,
+            projected,
+            target,
+            commands=self.commands,
+            parameter_loss=parameter_loss,
+            weight=weight,
+            balance=balance,
+            whole=whole,
         )
 
 
@@ -130,16 +150,24 @@ class Kick(NamedTuple):
     tackle: Tensor
 
 
+class Move(NamedTuple):
+    """The place of a move, metres: both coordinates with the shares of the same components."""
+
+    x: Mixture
+    y: Mixture
+
+
 class Distribution(NamedTuple):
     """What a `MixtureHead` answers, all for the command that they belong to.
 
     Attributes:
-        logits: (batch, 4) over CLONED_KINDS.
+        logits: (batch, commands).
         dash_power: power. dash_direction: (batch, DASH_DIRECTIONS) logits. turn: radians before the loss by motion.
         turn_factor: (batch,) turn moment for one degree.
         aim: the turn again, by the aims alone: only they are to learn from it.
         kick: several answers of which the mean counts.
         kicks: (kicks,) of which situations they are; None for all.
+        catch: (batch, CATCH_DIRECTIONS) logits. move: a place. None where this is no command of the model.
     """
 
     logits: Tensor
@@ -150,6 +178,8 @@ class Distribution(NamedTuple):
     aim: Mixture
     kick: tuple[Kick, ...]
     kicks: Tensor | None
+    catch: Tensor | None
+    move: Move | None
 
 
 class MixtureHead(nn.Module):
@@ -164,7 +194,8 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are, target_width: of what is known of each target. aims: places of `aims.Aims`.
+            kicks are, target_width: of what is known of each target. aims: places of `aims.Aims`. commands: what it
+            answers with.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.
@@ -172,16 +203,32 @@ class MixtureHead(nn.Module):
 
     temperature: Tensor
 
-    def __init__(self, width: int, parameter_width: int, kick_width: int, target_width: int, aims: int) -> None:
+    def __init__(
+        self,
+        *,
+        width: int,
+        parameter_width: int,
+        kick_width: int,
+        target_width: int,
+        aims: int,
+        commands: tuple[str, ...] = CLONED,
+    ) -> None:
         super().__init__()
         self.n_dash, self.n_turn = aims + INCOMES + FREE, aims + 2 + FREE
-        self.command = nn.Linear(width, len(CLONED_KINDS))
+        self.command = nn.Linear(width, len(commands))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
         self.kick = Kicks(kick_width, target_width)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))
+        self.catch = nn.Linear(parameter_width, CATCH_DIRECTIONS) if "catch" in commands else None
+        if self.catch is not None:
+            self.catch_edges = nn.Parameter(torch.tensor([-CATCH_EDGE_DEG, CATCH_EDGE_DEG]) * DEGREE)
+            self.catch_sharpness = nn.Parameter(torch.tensor(4.0))
+        self.move = nn.Linear(parameter_width, 5 * len(MOVE_PLACES)) if "move" in commands else None
+        if self.move is not None:
+            self.places = nn.Parameter(torch.tensor(MOVE_PLACES))
         self.register_buffer("temperature", torch.ones(()))
 
     def forward(self, situation: Situation) -> Distribution:
@@ -199,6 +246,8 @@ class MixtureHead(nn.Module):
                 aim=aim,
                 kick=kick,
                 kicks=situation.kicks,
+                catch=self._catch(situation),
+                move=self._move(situation),
             )
 
     def _dash(self, raw: Tensor, situation: Situation) -> Mixture:
@@ -226,6 +275,28 @@ class MixtureHead(nn.Module):
         width = torch.full_like(centre, AIM_SCALE_DEG * DEGREE)
         return turn, Mixture(logits.detach(), wrap(centre), width)
 
+    def _catch(self, situation: Situation) -> Tensor | None:
+        """Goalkeepers aim such that the ball lies at an edge of the catch area, not in its middle."""
+        if self.catch is None:
+            return None
+        names = ("x", "y", "cos", "sin", "ball_x", "ball_y")
+        x, y, cos, sin, ball_x, ball_y = geometry_of(situation.geometry, *names)
+        x, y = ball_x - x, ball_y - y
+        edges = wrap(torch.atan2(y * cos - x * sin, x * cos + y * sin) + self.catch_edges)
+        edges = edges.clamp(-CATCH_LIMIT_DEG * DEGREE, CATCH_LIMIT_DEG * DEGREE)
+        classes = torch.arange(CATCH_DIRECTIONS, device=x.device) * (2 * math.pi / CATCH_DIRECTIONS)
+        bells = self.catch_sharpness.exp() * (torch.cos(classes - edges[..., None]) - 1)
+        free: Tensor = self.catch(situation.parameters.float())
+        return free + bells.logsumexp(1)
+
+    def _move(self, situation: Situation) -> Move | None:
+        if self.move is None:
+            return None
+        logits, *raw = self.move(situation.parameters.float()).chunk(5, 1)
+        x, y = (base + MOVE_REACH_M * shift for base, shift in zip(self.places.T, raw[:2], strict=True))
+        x_scale, y_scale = (mixture.scale_of(scale, least=LEAST_PLACE, typical=2.0) for scale in raw[2:])
+        return Move(Mixture(logits, x, x_scale), Mixture(logits, y, y_scale))
+
     def _kick(self, situation: Situation) -> tuple[Kick, Kick]:
         """As the situation is and from its mirror: what is right on the left is right on the right."""
         both = self.kick(situation.kick, situation.kick_geometry, situation.targets)
@@ -251,11 +322,13 @@ class MixtureHead(nn.Module):
             aim=mixture.merged([output.aim for output in outputs]),
             kick=tuple(kick for output in outputs for kick in output.kick),
             kicks=outputs[0].kicks,
+            catch=mean_logits(catches) if (catches := [o.catch for o in outputs if o.catch is not None]) else None,
+            move=_mean_move(moves) if (moves := [o.move for o in outputs if o.move is not None]) else None,
         )
 
     @staticmethod
     def logits(output: Distribution) -> Tensor:
-        """(batch, 4) as they are trained, before the temperature."""
+        """(batch, commands) as they are trained, before the temperature."""
         return output.logits
 
     def point(self, output: Distribution) -> Prediction:
@@ -279,6 +352,13 @@ class MixtureHead(nn.Module):
             kick_direction,
             tackle,
         ]
+        if output.catch is not None:
+            parameters.append(direction_of(output.catch))
+        if output.move is not None:
+            x, y = output.move
+            parameters += mixture.middle_place(
+                x.logits, x.centre.clamp(-pitch.MAX_X, pitch.MAX_X), y.centre.clamp(-pitch.MAX_Y, pitch.MAX_Y)
+            ).unbind(1)
         return Prediction(output.logits / self.temperature, torch.stack(parameters, 1))
 
     def loss(
@@ -306,7 +386,7 @@ class MixtureHead(nn.Module):
             output.logits,
             _chosen(output, target, torch.stack(kicks).mean(0)),
             target,
-            aims=torch.where(target.kind == CLONED_KINDS.index(CommandKind.TURN), aims, 0.0),
+            aims=torch.where(target.kind == CLONED.index("turn"), aims, 0.0),
             weight=weight,
             aim_weight=aim_weight,
             balance=balance,
@@ -325,6 +405,10 @@ def _mean_kick(kicks: Sequence[Kick]) -> Kick:
         direction=mixture.merged([kick.direction for kick in kicks]),
         tackle=mean_logits([kick.tackle for kick in kicks]),
     )
+
+
+def _mean_move(moves: Sequence[Move]) -> Move:
+    return Move(mixture.merged([move.x for move in moves]), mixture.merged([move.y for move in moves]))
 
 
 def _spread(values: Tensor, output: Distribution) -> Tensor:
@@ -350,7 +434,15 @@ def _chosen(output: Distribution, target: Target, kick: Tensor) -> Tensor:
     turn = mixture.log_likelihood(
         output.turn.logits, mixture.angle_terms(output.turn, first, factor=output.turn_factor)
     )
-    by_kind = torch.stack([dash + log_class(output.dash_direction, second), turn, kick[:, 0], kick[:, 1]], 1)
+    terms = [dash + log_class(output.dash_direction, second), turn, kick[:, 0], kick[:, 1]]
+    if output.catch is not None:
+        terms.append(log_class(output.catch, first))
+    if output.move is not None:
+        x = mixture.clipped_terms(output.move.x, first, low=-pitch.MAX_X, high=pitch.MAX_X)
+        y = mixture.clipped_terms(output.move.y, second, low=-pitch.MAX_Y, high=pitch.MAX_Y)
+        terms.append(mixture.log_likelihood(output.move.x.logits, x + y))
+    terms += [torch.zeros_like(dash)] * (output.logits.shape[1] - len(terms))  # none has no parameters
+    by_kind = torch.stack(terms, 1)
     return by_kind.gather(1, target.kind[:, None]).squeeze(1)
 
 
@@ -381,7 +473,7 @@ class EnsembleHead(nn.Module):
         return self._first.merged(outputs)
 
     def logits(self, outputs: Sequence[Any]) -> Tensor:
-        """(batch, 4) of the mean probabilities, before the temperature."""
+        """(batch, commands) of the mean probabilities, before the temperature."""
         logits: Tensor = self._first.logits(self.merged(outputs))
         return logits
 

@@ -10,24 +10,19 @@ from torch import Tensor
 from torch.nn import functional
 
 from teamclone.models.state import Target
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+from teamclone.rcss.commands import CLONED, parameters_of
 
 ParameterLoss = Literal["paper", "masked"]
-
-LIMITS = torch.tensor([parameter.limit for parameter in PARAMETERS])
-"""(6,) in power and degrees: projects PARAMETERS onto [-1, 1]."""
-_ARGUMENT = torch.tensor([parameter.argument for parameter in PARAMETERS])
-_KIND = torch.tensor([CLONED_KINDS.index(parameter.kind) for parameter in PARAMETERS])
 
 
 class Balance(NamedTuple):
     """How the cross-entropy makes up for commands of unlike frequency.
 
     Attributes:
-        weight: (4,) over CLONED_KINDS, of a command's cross-entropy.
-        shift: (4,) added to the logits before it. With the logarithm of how much more often training sees a command
-            than the world does, the logits themselves come out as those of the world: prior correction (King and Zeng
-            2001), logit adjustment (Menon et al. 2021).
+        weight: (commands,) of a command's cross-entropy.
+        shift: (commands,) added to the logits before it. With the logarithm of how much more often training sees a
+            command than the world does, the logits themselves come out as those of the world: prior correction (King
+            and Zeng 2001), logit adjustment (Menon et al. 2021).
     """
 
     weight: Tensor
@@ -44,21 +39,28 @@ class Loss(NamedTuple):
 
 
 @cache
-def on(device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
-    """LIMITS, argument and kind of PARAMETERS on a device: copied there once, since a copy makes a GPU wait."""
-    return LIMITS.to(device), _ARGUMENT.to(device), _KIND.to(device)
+def on(device: torch.device, commands: tuple[str, ...] = CLONED) -> tuple[Tensor, Tensor, Tensor]:
+    """Limit, argument and kind of the parameters of commands, (parameters,) each, on a device.
+
+    A limit, in power, degrees and metres, projects onto [-1, 1]. They are copied there once: a copy makes a GPU wait.
+    """
+    items = parameters_of(commands)
+    limits = torch.tensor([item.limit for item in items])
+    argument = torch.tensor([item.argument for item in items])
+    kind = torch.tensor([commands.index(item.kind.name.lower()) for item in items])
+    return limits.to(device), argument.to(device), kind.to(device)
 
 
-def issued(kind: Tensor) -> Tensor:
-    """(batch, 6) bool: which of PARAMETERS belong to the command; ``kind`` is (batch,), index into CLONED_KINDS."""
-    return on(kind.device)[2] == kind[:, None]
+def issued(kind: Tensor, commands: tuple[str, ...] = CLONED) -> Tensor:
+    """(batch, parameters) bool: which belong to the command; ``kind`` is (batch,), index into ``commands``."""
+    return on(kind.device, commands)[2] == kind[:, None]
 
 
-def projected_parameters(target: Target) -> Tensor:
-    """(batch, 6) in [-1, 1]: PARAMETERS of the command given, zero for those of other commands (Table II)."""
-    limits, argument, _ = on(target.kind.device)
+def projected_parameters(target: Target, commands: tuple[str, ...] = CLONED) -> Tensor:
+    """(batch, parameters) in [-1, 1]: those of the command given, zero for those of other commands (Table II)."""
+    limits, argument, _ = on(target.kind.device, commands)
     values = target.parameters.index_select(1, argument) / limits
-    return torch.where(issued(target.kind), values, 0.0)
+    return torch.where(issued(target.kind, commands), values, 0.0)
 
 
 def command_loss(logits: Tensor, kind: Tensor, *, balance: Balance | None = None, of: int) -> Tensor:
@@ -73,6 +75,7 @@ def point_loss(
     projected: Tensor,
     target: Target,
     *,
+    commands: tuple[str, ...] = CLONED,
     parameter_loss: ParameterLoss = "paper",
     weight: float = 1.0,
     balance: Balance | None = None,
@@ -81,10 +84,11 @@ def point_loss(
     """Cross-entropy plus mean squared error, in the paper unweighted (section II-B).
 
     Args:
-        logits: (batch, 4).
-        projected: (batch, 6) predicted parameters in [-1, 1].
+        logits: (batch, commands).
+        projected: (batch, parameters) predicted parameters in [-1, 1].
         target: what the players did.
-        parameter_loss: "paper" takes the error over all six outputs, whose target is zero where the parameter was not
+        commands: what may be given.
+        parameter_loss: "paper" takes the error over all outputs, whose target is zero where the parameter was not
             issued; "masked" only over the issued ones.
         weight: of the squared error.
         balance: of the commands; None where they count alike.
@@ -93,11 +97,11 @@ def point_loss(
     """
     whole = target.kind if whole is None else whole
     cross_entropy = command_loss(logits, target.kind, balance=balance, of=len(whole))
-    squared = (projected - projected_parameters(target)).square()
+    squared = (projected - projected_parameters(target, commands)).square()
     if parameter_loss == "masked":
-        mse = (squared * issued(target.kind)).sum() / issued(whole).sum()
+        mse = (squared * issued(target.kind, commands)).sum() / issued(whole, commands).sum()
     else:
-        mse = squared.sum() / (len(whole) * len(PARAMETERS))
+        mse = squared.sum() / (len(whole) * squared.shape[1])
     return Loss(cross_entropy + weight * mse, cross_entropy, mse)
 
 
@@ -115,7 +119,7 @@ def mixture_loss(
     """Mean negative log-likelihood of the command and, given the command, of its parameters.
 
     Args:
-        logits: (batch, 4). log_likelihood: (batch,) of the parameters.
+        logits: (batch, commands). log_likelihood: (batch,) of the parameters.
         aims: (batch,) log-likelihood of the turns as the aims alone see them, 0 of other commands; None without aims.
         aim_weight: of its mean.
         target, weight, balance, whole: as of `point_loss`.

@@ -6,23 +6,31 @@ plays the same on both sides. A player's role hangs on his number, hence the lef
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from teamclone.models.state import CHANNEL, State, Target
-from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS
+from teamclone.rcss.commands import CLONED, parameters_of
 
 TEAM = 11
 """Players of the modelled team, who come first."""
 _BALL = torch.tensor([1.0, -1.0, 1.0, -1.0])
 _CHANNELS = torch.ones(len(CHANNEL))
 _CHANNELS[[CHANNEL[name] for name in ("y", "vy", "body", "neck")]] = -1.0
-_ARGUMENTS = torch.ones(len(CLONED_KINDS), 2)
-for _parameter in PARAMETERS:
-    if _parameter.angle:
-        _ARGUMENTS[CLONED_KINDS.index(_parameter.kind), _parameter.argument] = -1.0
+
+
+@cache
+def _arguments(commands: tuple[str, ...]) -> Tensor:
+    """(commands, 2) -1 for arguments that change their sign."""
+    signs = torch.ones(len(commands), 2)
+    for item in parameters_of(commands):
+        if item.sided:
+            signs[commands.index(item.kind.name.lower()), item.argument] = -1.0
+    return signs
 
 
 def mirror_state(state: State, places: Tensor) -> State:
@@ -40,12 +48,14 @@ def mirror_state(state: State, places: Tensor) -> State:
         past_ball=state.past_ball * ball,
         past_players=state.past_players.index_select(2, places) * channels,
         past_known=state.past_known,
+        mode=state.mode,
+        mode_cycles=state.mode_cycles,
     )
 
 
-def mirror_target(target: Target) -> Target:
-    """The commands reflected: turn moments and directions negated."""
-    return Target(target.kind, target.parameters * _ARGUMENTS.to(target.parameters)[target.kind])
+def mirror_target(target: Target, commands: tuple[str, ...] = CLONED) -> Target:
+    """The commands reflected: turn moments, directions and the y of places negated."""
+    return Target(target.kind, target.parameters * _arguments(commands).to(target.parameters)[target.kind])
 
 
 def mirror_places(mean: NDArray[np.floating]) -> Tensor:

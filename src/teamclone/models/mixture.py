@@ -18,6 +18,7 @@ from torch.nn import functional
 DEGREE = math.pi / 180.0
 LEAST_ANGLE = 0.03 * DEGREE
 LEAST_POWER = 0.03
+LEAST_PLACE = 0.03
 """Smallest scales: agents write arguments to the thousandth, and no density may run away."""
 CLIPPED = 1e-2
 """An argument so close to its bound, in its unit, was clipped to it."""
@@ -55,18 +56,23 @@ def _mass(low: Tensor, high: Tensor, scale: Tensor) -> Tensor:
     return torch.sigmoid(high / scale) - torch.sigmoid(low / scale)
 
 
-def power_terms(parts: Mixture, power: Tensor) -> Tensor:
-    """(batch, components) log-likelihoods of a power in 0..100 that each component alone gives it.
+def clipped_terms(parts: Mixture, value: Tensor, *, low: float, high: float) -> Tensor:
+    """(batch, components) log-likelihoods of a value in ``low``..``high`` that each component alone gives it.
 
     Args:
-        power: (batch,). At 0 or 100 it stands for all that a component has beyond.
+        value: (batch,). At a bound it stands for all that a component has beyond.
     """
-    away = power[:, None] - parts.centre
+    away = value[:, None] - parts.centre
     inside = _log_bell(away, parts.scale)
-    above = functional.logsigmoid(-(100.0 - parts.centre) / parts.scale)
-    below = functional.logsigmoid(-parts.centre / parts.scale)
-    terms = torch.where(power[:, None] >= 100.0 - CLIPPED, above, inside)
-    return torch.where(power[:, None] <= CLIPPED, below, terms)
+    above = functional.logsigmoid(-(high - parts.centre) / parts.scale)
+    below = functional.logsigmoid((low - parts.centre) / parts.scale)
+    terms = torch.where(value[:, None] >= high - CLIPPED, above, inside)
+    return torch.where(value[:, None] <= low + CLIPPED, below, terms)
+
+
+def power_terms(parts: Mixture, power: Tensor) -> Tensor:
+    """`clipped_terms` of a power in 0..100."""
+    return clipped_terms(parts, power, low=0.0, high=100.0)
 
 
 def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None) -> Tensor:
@@ -125,5 +131,16 @@ def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
     distance = centre[:, :, None] - centre[:, None, :]
     if angle:
         distance = wrap(distance)
-    expected = (distance.abs() * logits.softmax(1)[:, :, None]).sum(1)
-    return centre.gather(1, expected.argmin(1, keepdim=True)).squeeze(1)
+    return centre.gather(1, _nearest_to_all(logits, distance.abs())).squeeze(1)
+
+
+def middle_place(logits: Tensor, x: Tensor, y: Tensor) -> Tensor:
+    """(batch, 2) the same among places."""
+    apart = torch.hypot(x[:, :, None] - x[:, None, :], y[:, :, None] - y[:, None, :])
+    place = _nearest_to_all(logits, apart)
+    return torch.cat([x.gather(1, place), y.gather(1, place)], 1)
+
+
+def _nearest_to_all(logits: Tensor, apart: Tensor) -> Tensor:
+    """(batch, 1) the component with the least expected distance; ``apart`` is (batch, components, components)."""
+    return (apart * logits.softmax(1)[:, :, None]).sum(1).argmin(1, keepdim=True)

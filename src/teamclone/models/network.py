@@ -133,7 +133,10 @@ class Clone(nn.Module):
 
     @torch.no_grad()
     def predict(self, state: State) -> tuple[Tensor, Tensor]:
-        """Probabilities (batch, 4) over CLONED_KINDS and parameters (batch, 6) in power and degrees."""
+        """Probabilities (batch, commands) and parameters (batch, parameters) in power, degrees and metres.
+
+        Their order is that of ``config.commands`` and of its `parameters_of`; by default four and six.
+        """
         prediction: Prediction = self(state)
         return prediction.logits.softmax(1), prediction.parameters
 
@@ -146,11 +149,15 @@ def _trunk(config: ModelConfig, features: PaperFeatures | RelativeFeatures) -> n
 
 def _head(config: ModelConfig) -> PointHead | MixtureHead:
     if config.head == "mixture":
-        kick_width = config.kick_hidden[-1] + config.kick_attention
         return MixtureHead(
-            config.hidden[-1], config.parameter_hidden[-1], kick_width, config.kick_attention, config.aims
+            width=config.hidden[-1],
+            parameter_width=config.parameter_hidden[-1],
+            kick_width=config.kick_hidden[-1] + config.kick_attention,
+            target_width=config.kick_attention,
+            aims=config.aims,
+            commands=config.commands,
         )
-    return PointHead(config.hidden[-1])
+    return PointHead(config.hidden[-1], config.commands)
 
 
 def parameter_count(model: nn.Module) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -31,6 +32,7 @@ from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import DEFAULTS, GROUPS
+from teamclone.rcss.playmodes import RESTARTS, SITUATION, PlayMode, Situation
 
 PAST_FRAMES = 3
 NEAREST_OPPONENTS = 6
@@ -59,6 +61,11 @@ ball_x, ball_y, ball_vx, ball_vy: the ball. kick_gain: speed that one unit of ki
 turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from where he rolls out to where he meets it.
 mate_0_x, ...: the team mates, the nearest first; where one is missing, the actor.
 """
+_SIDED = Situation.KICK_OFF
+"""The first Situation that is one of the two teams', as all after it are."""
+MODES = _SIDED + 2 * (len(Situation) - _SIDED)
+_MODE_COLUMN = np.where(SITUATION < _SIDED, SITUATION, 2 * SITUATION - _SIDED + (RESTARTS < 0)).astype(np.int64)
+"""(256,) which of MODES a play mode is: a Situation that is nobody's, or one and who restarts, the own team first."""
 _PLACE = {name: index for index, name in enumerate(GEOMETRY)}
 
 OTHERS = MATES + 11
@@ -94,6 +101,7 @@ class RelativeFeatures(nn.Module):
     """
 
     signs: Tensor
+    mode_column: Tensor
 
     def __init__(self, blocks: tuple[str, ...] = BLOCKS, *, others: bool = False) -> None:
         super().__init__()
@@ -106,6 +114,7 @@ class RelativeFeatures(nn.Module):
             "last_command",
         )
         self.own_type = TypeParameters(tuple(GROUPS))
+        self.register_buffer("mode_column", torch.from_numpy(_MODE_COLUMN), persistent=False)
         parts = self._parts(_blank(self.history))
         self.names = (
             *(f"{name}_{i}" for name in ("scene", *self.blocks) for i in range(parts[name].shape[1])),
@@ -267,6 +276,7 @@ class RelativeFeatures(nn.Module):
             ),
         }
         others = _others(players, view, body, reach, to_ball)
+        parts["mode"] = self._mode(state, goalkeeper=(_of(flags, actor) & FLAG_GOALIE) != 0)
         parts["mates"] = _nearest(others, to_me, mate, MATES)
         parts["opponents"] = _nearest(others, to_me, opponent, NEAREST_OPPONENTS)
         parts["rivals"] = _nearest(others, to_ball, opponent, RIVALS)
@@ -311,6 +321,13 @@ class RelativeFeatures(nn.Module):
             1,
         )
         return parts
+
+    def _mode(self, state: State, *, goalkeeper: Tensor) -> Tensor:
+        """(batch, MODES + 3) the play mode one-hot, how long it lasts already, whether the actor is the goalkeeper."""
+        mode = functional.one_hot(self.mode_column[state.mode], MODES).to(state.ball.dtype)
+        cycles = state.mode_cycles.to(state.ball.dtype)
+        rest = [cycles.clamp(max=10) / 10, cycles.clamp(max=100) / 100, goalkeeper.to(state.ball.dtype)]
+        return torch.cat([mode, torch.stack(rest, 1)], 1)
 
 
 class _View:
@@ -492,6 +509,8 @@ def _any(history: int) -> State:
         past_ball=ball[:, 1:],
         past_players=players[:, 1:],
         past_known=torch.ones(n, history, dtype=torch.bool),
+        mode=torch.full((n,), PlayMode.PLAY_ON),
+        mode_cycles=torch.ones(n),
     )
 
 
@@ -506,4 +525,6 @@ def _blank(history: int) -> State:
         past_ball=torch.zeros(1, history, 4),
         past_players=torch.zeros(1, history, 22, n_channels),
         past_known=torch.zeros(1, history, dtype=torch.bool),
+        mode=torch.full((1,), PlayMode.PLAY_ON),
+        mode_cycles=torch.zeros(1),
     )

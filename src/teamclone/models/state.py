@@ -9,6 +9,7 @@ from torch import Tensor
 
 from teamclone.dataset.layout import PLAYER_CHANNELS
 from teamclone.rcss.player_types import FIELDS
+from teamclone.rcss.playmodes import PlayMode
 
 
 class State(NamedTuple):
@@ -22,6 +23,8 @@ class State(NamedTuple):
         past_ball, past_players: (batch, frames, 4) and (batch, frames, 22, channels), the same one, two, ... cycles
             before; as many frames as the model asks for, none for most.
         past_known: (batch, frames) bool; False where play had not yet begun, there the past repeats the present.
+        mode: (batch,) int64, the PlayMode as if the modelled team were the left one: KICK_IN_L is its own kick-in.
+        mode_cycles: (batch,) frames since this mode began, 0 in its first.
     """
 
     ball: Tensor
@@ -31,10 +34,21 @@ class State(NamedTuple):
     past_ball: Tensor
     past_players: Tensor
     past_known: Tensor
+    mode: Tensor
+    mode_cycles: Tensor
 
     @classmethod
-    def now(cls, *, ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> State:
-        """Situations of which no past is asked."""
+    def now(
+        cls,
+        *,
+        ball: Tensor,
+        players: Tensor,
+        types: Tensor,
+        actor: Tensor,
+        mode: Tensor | None = None,
+        mode_cycles: Tensor | None = None,
+    ) -> State:
+        """Situations of which no past is asked; without a mode in play_on, and of a mode that just began."""
         n, n_players, n_channels = players.shape
         return cls(
             ball=ball,
@@ -44,6 +58,8 @@ class State(NamedTuple):
             past_ball=ball.new_empty(n, 0, 4),
             past_players=players.new_empty(n, 0, n_players, n_channels),
             past_known=torch.empty(n, 0, dtype=torch.bool, device=ball.device),
+            mode=torch.full_like(actor, PlayMode.PLAY_ON) if mode is None else mode,
+            mode_cycles=ball.new_zeros(n) if mode_cycles is None else mode_cycles,
         )
 
     def to(self, device: torch.device) -> State:
@@ -51,7 +67,8 @@ class State(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What the player did: kind (batch,) int64 index into CLONED_KINDS; parameters (batch, 2) in power and degrees."""
+    """What the player did: kind (batch,) int64 index into the dataset's commands; parameters (batch, 2) in power,
+    degrees and metres."""
 
     kind: Tensor
     parameters: Tensor

@@ -47,7 +47,7 @@ def count_holes(match: Match) -> Holes:
         return np.bincount(place[index], minlength=n_frames * N_PLAYERS).reshape(n_frames, N_PLAYERS)
 
     mode = match.frames["playmode"]
-    body = per_frame(body_commands(commands, mode, play_on=PlayMode.PLAY_ON))
+    body = per_frame(body_commands(commands, mode))
     heard = per_frame(np.flatnonzero((commands["frame"] >= 0) & (slot >= 0))) > 0
     state = match.players["state"]
     free = ((state & state_bits.STAND) != 0) & ((state & _FROZEN) == 0)

@@ -1,4 +1,4 @@
-"""Commands that clients send, and the four that a clone predicts.
+"""Commands that clients send, and those that a clone predicts.
 
 Ids are stable: they are written into stores and datasets.
 """
@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
+
+from teamclone.rcss import pitch
 
 
 class CommandKind(IntEnum):
@@ -60,7 +63,16 @@ BODY_KINDS = (
 """Commands of which the server takes one per player and cycle, the first (rcssserver `player.cpp`)."""
 
 CLONED_KINDS = (CommandKind.DASH, CommandKind.TURN, CommandKind.KICK, CommandKind.TACKLE)
-"""The commands a model predicts, in the order of its output classes (Table II of the paper)."""
+"""The commands a model predicts by default, in the order of its output classes (Table II of the paper)."""
+
+CLONED = tuple(kind.name.lower() for kind in CLONED_KINDS)
+"""The same as words."""
+
+REPERTOIRE = (*CLONED, "catch", "move", "none")
+"""All that a dataset may have and a model predict, in this order; ``none`` is a cycle without a body command.
+
+Every dataset and every model has the first four, so that places of these and of their parameters are the same in all.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +88,11 @@ class Parameter:
     angle: bool
     """True where ±limit are the same direction."""
 
+    @property
+    def sided(self) -> bool:
+        """Whether it changes its sign where left and right are exchanged."""
+        return self.angle or self.name == "move_y"
+
 
 PARAMETERS = (
     Parameter(name="dash_power", kind=CommandKind.DASH, argument=0, unit="power", limit=100.0, angle=False),
@@ -86,3 +103,18 @@ PARAMETERS = (
     Parameter(name="tackle_direction", kind=CommandKind.TACKLE, argument=0, unit="deg", limit=180.0, angle=True),
 )
 """The regression outputs in the order of Table II of the paper."""
+
+_FURTHER = (
+    Parameter(name="catch_direction", kind=CommandKind.CATCH, argument=0, unit="deg", limit=180.0, angle=True),
+    Parameter(name="move_x", kind=CommandKind.MOVE, argument=0, unit="m", limit=pitch.MAX_X, angle=False),
+    Parameter(name="move_y", kind=CommandKind.MOVE, argument=1, unit="m", limit=pitch.MAX_Y, angle=False),
+)
+
+
+@cache
+def parameters_of(commands: tuple[str, ...]) -> tuple[Parameter, ...]:
+    """The parameters of some of REPERTOIRE, PARAMETERS first; those of a move are places as the mover's team sees them.
+
+    The server turns the place of a right team's move (rcssserver `player.cpp`), so it stays as it was sent.
+    """
+    return (*PARAMETERS, *(item for item in _FURTHER if item.kind.name.lower() in commands))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numpy as np
+
 
 class PlayMode(IntEnum):
     """A play mode; ``PlayMode.PLAY_ON.name.lower()`` is the server's string."""
@@ -64,3 +66,73 @@ class PlayMode(IntEnum):
 
 BY_NAME: dict[str, PlayMode] = {mode.name.lower(): mode for mode in PlayMode}
 """Server string to play mode."""
+
+
+MOVE_MODES = (
+    PlayMode.BEFORE_KICK_OFF,
+    PlayMode.GOAL_L,
+    PlayMode.GOAL_R,
+    PlayMode.FREE_KICK_L,
+    PlayMode.FREE_KICK_R,
+)
+"""Where the server takes a ``move``, in a free kick from a goalkeeper who holds the ball; elsewhere it ignores it and
+the player's slot stays free (rcssserver `player.cpp`, move)."""
+
+
+class Situation(IntEnum):
+    """What a play mode means for the players, whichever team's it is."""
+
+    OTHER = 0
+    """No play: over, paused, or a penalty shoot-out, for which all but two players wait in the middle."""
+    PLAY_ON = 1
+    BEFORE_KICK_OFF = 2
+    KICK_OFF = 3
+    KICK_IN = 4
+    FREE_KICK = 5
+    INDIRECT_FREE_KICK = 6
+    CORNER_KICK = 7
+    GOAL_KICK = 8
+    GOAL = 9
+    """The clock stands until the kick-off."""
+    FAULT = 10
+    """A foul or an offside: the clock stands until the free kick."""
+
+
+_FAULTS = (
+    "OFFSIDE",
+    "FOUL_CHARGE",
+    "FOUL_PUSH",
+    "FOUL_MULTIPLE_ATTACK",
+    "FOUL_BALLOUT",
+    "BACK_PASS",
+    "FREE_KICK_FAULT",
+    "CATCH_FAULT",
+    "ILLEGAL_DEFENSE",
+)
+
+
+def _situation(mode: PlayMode) -> Situation:
+    name = mode.name.removesuffix("_L").removesuffix("_R")
+    return Situation.FAULT if name in _FAULTS else Situation.__members__.get(name, Situation.OTHER)
+
+
+def _restarts(mode: PlayMode) -> int:
+    if not mode.name.endswith(("_L", "_R")):
+        return 0
+    side = 1 if mode.name.endswith("_L") else -1
+    return -side if _situation(mode) in (Situation.GOAL, Situation.FAULT) else side
+
+
+SITUATION = np.zeros(256, np.uint8)
+"""(256,) the Situation of each play mode by its id."""
+RESTARTS = np.zeros(256, np.int8)
+"""(256,) whose restart it is or will be: 1 of the left team, -1 of the right one, 0 of none.
+
+Names of goals and faults are of the team that did it; the other one restarts.
+"""
+OTHER_SIDE = np.arange(256, dtype=np.uint8)
+"""(256,) the same play mode with the teams' sides exchanged."""
+for _mode in PlayMode:
+    SITUATION[_mode], RESTARTS[_mode] = _situation(_mode), _restarts(_mode)
+    if RESTARTS[_mode]:
+        OTHER_SIDE[_mode] = PlayMode[f"{_mode.name[:-1]}{'R' if _mode.name.endswith('_L') else 'L'}"]

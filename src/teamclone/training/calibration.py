@@ -8,6 +8,7 @@ from functools import partial
 import torch
 from torch import Tensor
 
+from teamclone.rcss.commands import CLONED
 from teamclone.training.group import ALONE, Group
 
 COLDEST, HOTTEST = 0.01, 100.0
@@ -19,12 +20,12 @@ STEPS = 30
 class Calibration:
     """Logits and commands of all samples seen so far, of this process's share of them."""
 
-    def __init__(self, device: torch.device) -> None:
-        self.logits = [torch.empty(0, 4, dtype=torch.float64, device=device)]
+    def __init__(self, device: torch.device, commands: tuple[str, ...] = CLONED) -> None:
+        self.logits = [torch.empty(0, len(commands), dtype=torch.float64, device=device)]
         self.kinds = [torch.empty(0, dtype=torch.int64, device=device)]
 
     def add(self, logits: Tensor, kind: Tensor) -> None:
-        """One batch: (batch, 4) as they are trained and (batch,) index into CLONED_KINDS."""
+        """One batch: (batch, commands) as they are trained and (batch,) index into the commands."""
         self.logits.append(logits.detach().double())
         self.kinds.append(kind)
 

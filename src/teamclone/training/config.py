@@ -11,6 +11,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from teamclone.errors import UsageError, choose
 from teamclone.models.config import ACTIVATIONS, ATTENTION_HEADS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
+from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.rcss.player_types import GROUPS
 from teamclone.settings import value_of
 
@@ -99,6 +100,7 @@ MAY_CHANGE = ("train.epochs", "train.max_minutes")
 """Settings that a resumed run may have otherwise than before: they do not change what an epoch does."""
 
 _CHOICES: dict[str, tuple[str, ...]] = {
+    "model.commands": REPERTOIRE,
     "model.features": FEATURE_SETS,
     "model.activation": ACTIVATIONS,
     "model.all_types": tuple(GROUPS),
@@ -321,6 +323,14 @@ def _converted(key: str, value: Any, hint: Any) -> Any:
             raise UsageError(f"{key}: names one more than once: {', '.join(converted)}")
         if key == "model.hidden" and not converted:
             raise UsageError(f"{key}: expected at least one width")
+        if key == "model.commands" and converted != (
+            *CLONED,
+            *(name for name in REPERTOIRE[len(CLONED) :] if name in converted),
+        ):
+            raise UsageError(
+                f"{key}: expected {', '.join(CLONED)} and then, in this order, some of "
+                f"{', '.join(REPERTOIRE[len(CLONED) :])}; got {', '.join(converted)}"
+            )
         return converted
     return _scalar(key, value, hint)
 

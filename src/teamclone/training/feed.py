@@ -171,7 +171,9 @@ class Feed:
                 part = share[some.to(share.device) if isinstance(share, Tensor) else some.numpy()]
                 columns[some.to(self.device)] = self._columns(part, mirror=mirror)
         turned = turned.to(target.parameters.device)
-        parameters = torch.where(turned[:, None], mirror_target(target).parameters, target.parameters)
+        parameters = torch.where(
+            turned[:, None], mirror_target(target, self.dataset.commands).parameters, target.parameters
+        )
         return Batch(self.inputs.normalise(columns), Target(target.kind, parameters), whole)
 
 

@@ -25,7 +25,7 @@ from teamclone.files import write_atomic
 from teamclone.models.loss import Balance, ParameterLoss
 from teamclone.models.network import Clone
 from teamclone.models.state import Target
-from teamclone.rcss.commands import CLONED_KINDS, CommandKind
+from teamclone.rcss.commands import CLONED
 from teamclone.training.calibration import Calibration
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
@@ -40,7 +40,7 @@ WARM_UP = 200
 """Batches over which the cosine schedule rises."""
 GATHER_ROWS = 16384
 """Rows gathered at once where the batch size does not matter; bounds memory."""
-WITH_BALL = tuple(CLONED_KINDS.index(kind) for kind in (CommandKind.KICK, CommandKind.TACKLE))
+WITH_BALL = CLONED.index("kick"), CLONED.index("tackle")
 """Classes whose parameters the layers of a kick find."""
 ONEDNN_ACTIVATIONS = ("relu", "gelu")
 """Those that PyTorch can take through oneDNN in single precision, forth and back."""
@@ -75,12 +75,23 @@ def train(
     Started by ``torchrun``, each process has a share of every batch; the result is the same but for rounding.
 
     Raises:
-        UsageError: the machine lacks what the config asks for.
+        UsageError: the machine lacks what the config asks for, or the dataset has other commands than the model.
         DatasetError: the dataset lacks training or validation samples, or a value that the inputs need.
         RunError: the folder holds a run already, or one that does not fit, or another process trains into it; or
             training diverged.
     """
     with ExitStack() as stack:
+        commands = dataset.commands
+        if config.model.commands != commands:
+            raise UsageError(
+                f"{dataset.path}: has the commands {', '.join(commands)}, the model is for "
+                f"{', '.join(config.model.commands)}; "
+                + (
+                    "make the dataset with the options of that of the base"
+                    if base
+                    else f"add --set model.commands={','.join(commands)}"
+                )
+            )
         device, precision = _resources(config.train)
         group = stack.enter_context(joined(device))
         rows = dataset.split(Split.TRAIN)
@@ -141,7 +152,7 @@ def train(
         )
         kinds = dataset.samples["kind"].numpy()[rows]
         rows_with_ball = rows[np.isin(kinds, WITH_BALL)]
-        draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(CLONED_KINDS)), device)
+        draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(commands)), device)
         batch_size = config.data.batch_size
         journal = stack.enter_context(Journal(run, done)) if group.rank == 0 else None
         began = time.monotonic()
@@ -165,7 +176,7 @@ def train(
             if config.data.mirror:
                 mirrored = epoch_mirrored(len(order), seed=config.train.seed, epoch=epoch - 1, share=config.data.mirror)
             batches = math.ceil(len(order) / batch_size)
-            scores = Scores(device)
+            scores = Scores(device, commands)
             model.train()
             kicks = _kick_order(config.train, rows_with_ball, epoch=epoch, batches=batches)
             kick_batches = feed.batches(kicks, config.train.kicks) if len(kicks) else iter(())
@@ -189,7 +200,7 @@ def train(
             record |= {f"train_{name}": value for name, value in scores.table(group).items()}
             record["samples_per_s"] = len(order) / (time.monotonic() - epoch_began)
             model.eval()
-            scores, calibration = Scores(device), Calibration(device)
+            scores, calibration = Scores(device, commands), Calibration(device, commands)
             with torch.no_grad():
                 for inputs, target, whole in feed.batches(validation_rows, batch_size):
                     output = answer_of(inputs, kicks=with_ball(target))
@@ -332,11 +343,11 @@ def balanced(
     """How commands of unlike frequency are made up for.
 
     Args:
-        counts: (4,) training samples of each command.
+        counts: (commands,) training samples of each command.
 
     Returns:
-        (4,) how often a sample of each command is drawn, None for once; and what the loss needs to know, None for
-        nothing.
+        (commands,) how often a sample of each command is drawn, None for once; and what the loss needs to know, None
+        for nothing.
     """
     if config.balance == "none":
         return None, None

@@ -33,7 +33,7 @@ from teamclone.errors import RunError, UsageError
 from teamclone.files import held, write_atomic
 from teamclone.machine import processor
 from teamclone.models.network import Clone
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.rcss.commands import REPERTOIRE
 from teamclone.training.checkpoint import load_weights, save_weights
 from teamclone.training.config import Config, config_from, to_toml
 
@@ -51,10 +51,7 @@ BEST: dict[str, tuple[str, Callable[[float, float], bool]]] = {
     "best-loss": ("validation_loss", float.__lt__),
     "best-accuracy": ("validation_accuracy", float.__gt__),
     "best-parameters": ("validation_parameter_mae", float.__lt__),
-    **{
-        f"best-recall-{kind.name.lower()}": (f"validation_recall_{kind.name.lower()}", float.__gt__)
-        for kind in CLONED_KINDS
-    },
+    **{f"best-recall-{name}": (f"validation_recall_{name}", float.__gt__) for name in REPERTOIRE},
 }
 """Checkpoints by the figure that they are best in, and what is better; of equals the first."""
 

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
 from teamclone.models.heads import Prediction
 from teamclone.models.loss import Loss, issued, on, projected_parameters
 from teamclone.models.state import Target
-from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.rcss.commands import CLONED
 from teamclone.training.group import ALONE, Group
-
-_N = len(CLONED_KINDS)
 
 
 class Scores:
     """Sums over all samples seen so far. They stay on the device: no batch waits for a number."""
 
-    def __init__(self, device: torch.device) -> None:
+    def __init__(self, device: torch.device, commands: tuple[str, ...] = CLONED) -> None:
+        self.commands = commands
         self.sums = torch.zeros(6, dtype=torch.float64, device=device)
-        self.confusion = torch.zeros(_N * _N, dtype=torch.int64, device=device)
+        self.confusion = torch.zeros(len(commands) ** 2, dtype=torch.int64, device=device)
 
     @torch.no_grad()
     def add(self, loss: Loss, prediction: Prediction, target: Target, *, batch: int | None = None) -> None:
         """Count one batch, or a process's share of a ``batch`` of so many samples."""
-        mask = issued(target.kind)
-        error = (prediction.parameters / on(mask.device)[0] - projected_parameters(target)).abs()
+        mask = issued(target.kind, self.commands)
+        limits = on(mask.device, self.commands)[0]
+        error = (prediction.parameters / limits - projected_parameters(target, self.commands)).abs()
         n = len(mask) if batch is None else batch
         parts = (
             loss.total * n,
@@ -36,7 +38,7 @@ class Scores:
             mask.sum(),
         )
         self.sums += torch.stack([part.detach().double() for part in parts])
-        cells = target.kind * _N + prediction.logits.argmax(1)
+        cells = target.kind * len(self.commands) + prediction.logits.argmax(1)
         # Not bincount, for which a GPU has to tell the host how much there is to count.
         self.confusion.index_add_(0, cells, torch.ones_like(cells))
 
@@ -45,12 +47,12 @@ class Scores:
 
         ``loss``, ``cross_entropy``, ``parameter_loss``: means per sample, of the training error and its parts.
         ``accuracy``, ``recall_<command>``.
-        ``parameter_mae``: the paper's, over all six outputs in [-1, 1] with zeros for those not issued.
+        ``parameter_mae``: the paper's, over all outputs, by default six, in [-1, 1] with zeros for those not issued.
         ``issued_mae``: the same over issued parameters only.
         """
         group.add_up(self.sums, self.confusion)
         total, cross_entropy, of_parameters, mae, issued_error, n_issued = self.sums.tolist()
-        confusion = self.confusion.reshape(_N, _N).cpu()
+        confusion = self.confusion.reshape(len(self.commands), -1).cpu()
         n = int(confusion.sum())
         values = {
             "loss": total / n,
@@ -60,13 +62,13 @@ class Scores:
             "parameter_mae": mae / n,
             "issued_mae": issued_error / n_issued,
         }
-        return values | _recalls(confusion)
+        return values | _recalls(confusion, self.commands)
 
 
-def _recalls(confusion: Tensor) -> dict[str, float]:
+def _recalls(confusion: Tensor, commands: Sequence[str]) -> dict[str, float]:
     """``recall_<command>`` from counts (true, predicted)."""
     return {
-        f"recall_{kind.name.lower()}": int(row[index]) / int(row.sum())
-        for index, (kind, row) in enumerate(zip(CLONED_KINDS, confusion, strict=True))
+        f"recall_{name}": int(row[index]) / int(row.sum())
+        for index, (name, row) in enumerate(zip(commands, confusion, strict=True))
         if row.sum()
     }

@@ -37,7 +37,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> fidelity.Work:
     document = make_dataset(out / "dataset", frames_per_match=n, **{"samples/split": values}) / "dataset.json"
     meta = json.loads(document.read_text())
     for match, opponent in zip(meta["matches"], ("Red", "Red", "Blue", "Green"), strict=True):
-        match |= {"opponent": opponent, "rows": dict.fromkeys(fidelity.KINDS, 5)}
+        match |= {"opponent": opponent, "rows": dict.fromkeys(fidelity.CLONED, 5)}
     meta |= {"options": {"test_matches": []}, "cleaning": {"matches": meta["matches"]}}
     document.write_text(json.dumps(meta))
     return fidelity.Work(fidelity.parser().parse_args(["LOGS", "--out", str(out), "--test-match"]))

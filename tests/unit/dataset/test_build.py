@@ -24,12 +24,13 @@ import pytest
 import torch
 
 from disk import small_disk
-from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
+from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset, is_current
 from teamclone.dataset.layout import FLAG_GOALIE, Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import ClusterError, DatasetError, StoreError, UsageError
 from teamclone.logs import read_match
 from teamclone.models.state import CHANNEL
+from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.store import Store, create_store, open_store
 
 TEAM = "HELIOS_base"
@@ -210,6 +211,51 @@ def test_goalkeepers_stay_out_of_a_match_against_an_unseen_team(store: Store, tm
         build_dataset(config, store=store, out=tmp_path / str(keepers), jobs=1)
         counts.append(len(open_dataset(tmp_path / str(keepers))))
     assert counts[0] == counts[1]
+
+
+def test_beyond_play_on_is_written_only_where_it_is_asked_for(
+    store: Store, config: DatasetConfig, tmp_path: Path
+) -> None:
+    usual = build_dataset(config, store=store, out=tmp_path / "usual", jobs=1)
+    whole = dataclasses.replace(config, goalkeepers=True, set_plays=True, idle=True)
+    report = build_dataset(whole, store=store, out=tmp_path / "whole", jobs=1)
+    meta = open_dataset(tmp_path / "usual").meta
+    assert "commands" not in meta
+    assert not {"goalkeepers", "set_plays", "idle"} & set(meta["options"])
+    dataset = open_dataset(tmp_path / "whole")
+    assert dataset.commands == REPERTOIRE
+    assert {name: dataset.meta["options"][name] for name in ("goalkeepers", "set_plays", "idle")} == {
+        "goalkeepers": True,
+        "set_plays": True,
+        "idle": True,
+    }
+    for split in ("train", "validation", "test"):
+        assert tuple(report["rows"][split]) == REPERTOIRE
+        assert sum(report["rows"][split].values()) > sum(usual["rows"][split].values()) > 0
+    state = dataset.state(np.arange(len(dataset)))
+    keeper = (state.players[torch.arange(len(dataset)), state.actor, CHANNEL["flags"]].long() & FLAG_GOALIE) != 0
+    assert set(dataset.samples["split"][keeper].tolist()) == {Split.TRAIN, Split.VALIDATION, Split.TEST}
+    assert is_current(tmp_path / "usual", config, store)
+    assert is_current(tmp_path / "whole", whole, store)
+    assert not is_current(tmp_path / "usual", whole, store)
+
+
+@pytest.mark.parametrize(
+    ("options", "commands"),
+    [({"goalkeepers": True}, "catch"), ({"set_plays": True}, "move"), ({"idle": True}, "none")],
+)
+def test_each_option_adds_its_command(config: DatasetConfig, options: dict[str, bool], commands: str) -> None:
+    assert config.repertoire == CLONED
+    assert dataclasses.replace(config, **options).repertoire == (*CLONED, commands)
+
+
+def test_goalkeepers_in_training_alone_and_everywhere_exclude_each_other(
+    store: Store, config: DatasetConfig, tmp_path: Path
+) -> None:
+    config = dataclasses.replace(config, goalkeepers=True, train_goalkeepers=True)
+    with pytest.raises(UsageError, match=r"--goalkeepers takes .* in every split; leave out --train-goalkeepers"):
+        build_dataset(config, store=store, out=tmp_path / "ds", jobs=1)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_goalkeepers_need_a_split_by_match(store: Store, config: DatasetConfig, tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from teamclone.logs.align import executed_kind, first_body_commands, slot_of
 from teamclone.logs.columns import COMMANDS, FRAMES, PLAYERS
 from teamclone.logs.match import Columns, empty_columns
 from teamclone.rcss import state_bits
-from teamclone.rcss.commands import CommandKind
-from teamclone.rcss.playmodes import PlayMode
+from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
+from teamclone.rcss.playmodes import SITUATION, PlayMode, Situation
 
 
 def made_match(n_frames: int = 6) -> tuple[Columns, Columns]:
@@ -224,6 +224,109 @@ def test_a_missing_value_is_stored_as_missing() -> None:
     assert (result.frames["detail"][..., layout.DETAIL["capacity"]] == layout.MISSING).all()
 
 
+def test_set_plays_and_moves_where_they_are_asked_for() -> None:
+    frames, players = made_match(8)
+    frames["playmode"][:] = [
+        PlayMode.KICK_OFF_L,
+        PlayMode.PLAY_ON,
+        PlayMode.GOAL_R,
+        PlayMode.GOAL_R,
+        PlayMode.OFFSIDE_L,
+        PlayMode.PENALTY_READY_L,
+        PlayMode.GOAL_KICK_L,
+        PlayMode.TIME_OVER,
+    ]
+    # The clock stands after the goal: two frames of one cycle.
+    frames["cycle"][3:], frames["stoppage"][3] = frames["cycle"][2:-1], 1
+    executed = {0: "DASH", 1: "DASH", 2: "MOVE", 3: "TURN", 4: "TURN", 5: "TURN", 6: "TURN"}
+    for frame, name in executed.items():
+        execute(players, frame, 1, CommandKind[name])
+    commands = table(
+        command(0, 2, CommandKind.DASH, 60.0, 0.0),
+        command(1, 2, CommandKind.MOVE, -9.0, 9.0),  # in play: ignored, leaves the slot
+        command(1, 2, CommandKind.DASH, 70.0, 0.0),
+        command(2, 2, CommandKind.MOVE, -15.0, 12.5),
+        command(2, 2, CommandKind.TURN, 1.0),  # the slot is taken
+        command(3, 2, CommandKind.TURN, 20.0),
+        command(4, 2, CommandKind.TURN, 30.0),
+        command(5, 2, CommandKind.TURN, 40.0),  # a penalty shoot-out
+        command(6, 2, CommandKind.MOVE, -9.0, 9.0),  # before a goal kick: ignored, leaves the slot
+        command(6, 2, CommandKind.TURN, 50.0),
+    )
+    in_play = clean_match(frames, players, commands, {}, side=1)
+    assert in_play.samples["parameters"].tolist() == [[70.0, 0.0]]
+    always = clean_match(frames, players, commands, {}, side=1, repertoire=(*CLONED, "move"))
+    assert always.samples["kind"].tolist() == [0, 0, 4, 1, 1, 1]
+    assert always.samples["parameters"].tolist() == [[60, 0], [70, 0], [-15, 12.5], [20, 0], [30, 0], [50, 0]]
+    assert always.frames["playmode"].tolist() == [*frames["playmode"][:5], PlayMode.GOAL_KICK_L]
+    assert always.frames["cycle"].tolist() == [1, 2, 3, 3, 4, 6]
+    found = rules(always)
+    assert (found["in play_on or around a set play"], found["first of the cycle"]) == (1, 3)
+    # Ten field players in the six frames with a successor that are no penalty.
+    assert (always.player_cycles, always.idle) == (60, 54)
+
+
+def test_goalkeepers_catch_where_it_is_asked_for() -> None:
+    frames, players = made_match()
+    for frame, name in enumerate(("CATCH", "DASH")):
+        execute(players, frame, 0, CommandKind[name])
+    commands = table(command(0, 1, CommandKind.CATCH, 133.0), command(1, 1, CommandKind.DASH, 5.0, 0.0))
+    params: dict[str, float | str] = {"min_catch_angle": -90.0, "max_catch_angle": 90.0}
+    result = clean_match(frames, players, commands, params, side=1, repertoire=(*CLONED, "catch"))
+    assert result.samples["kind"].tolist() == [4, 0]
+    assert result.samples["parameters"].tolist() == [[90.0, 0.0], [5.0, 0.0]]
+    assert "of field players" not in rules(result)
+    assert result.player_cycles == 5 * 11
+
+
+def test_places_of_a_move_are_the_movers_whichever_side_he_is_on() -> None:
+    for side, slot in ((1, 4), (-1, 15)):
+        frames, players = made_match()
+        frames["playmode"][:] = PlayMode.GOAL_L
+        execute(players, 0, slot, CommandKind.MOVE)
+        players["x"][1:, slot], players["y"][1:, slot] = side * -20.0, side * 7.0  # as the server puts him
+        commands = table(
+            command(0, 5, CommandKind.MOVE, -20.0, 7.0, side=side), command(1, 5, CommandKind.TURN, side=side)
+        )
+        execute(players, 1, slot, CommandKind.TURN)
+        result = clean_match(frames, players, commands, {}, side=side, repertoire=(*CLONED, "move"))
+        assert result.samples["parameters"][0].tolist() == [-20.0, 7.0]
+        assert result.frames["position"][1, 4].tolist() == [-20.0, 7.0]
+
+
+def test_a_move_off_the_pitch_ends_where_the_server_clips_it() -> None:
+    frames, players = made_match()
+    frames["playmode"][:] = PlayMode.GOAL_L
+    execute(players, 0, 1, CommandKind.MOVE)
+    commands = table(command(0, 2, CommandKind.MOVE, -99.0, 99.0))
+    result = clean_match(frames, players, commands, {}, side=1, repertoire=(*CLONED, "move"))
+    assert result.samples["parameters"].tolist() == [[-57.5, 39.0]]
+
+
+def test_cycles_without_a_command_are_samples_where_they_are_asked_for() -> None:
+    frames, players = made_match(n_frames=3)
+    players["state"][:, 5:11] = 0  # never connected
+    players["state"][0, 3] |= state_bits.TACKLE
+    execute(players, 0, 1, CommandKind.DASH)
+    execute(players, 1, 2, CommandKind.DASH)  # whose command the log lost
+    commands = table(
+        command(0, 2, CommandKind.DASH, 1.0, 0.0), command(1, 2, CommandKind.TURN, 3.0)
+    )  # the last refused
+    result = clean_match(frames, players, commands, {}, side=1, repertoire=(*CLONED, "none"))
+    by_row = list(zip(*(result.samples[name].tolist() for name in ("frame", "player", "kind")), strict=True))
+    # Number 2 dashes and then has a command that was refused; 3 loses one; 4 and 5 give none, as 4 first cannot.
+    assert by_row == [(0, 1, 0), (0, 2, 4), (0, 3, 4), (0, 4, 4), (1, 3, 4), (1, 4, 4)]
+    assert not result.samples["parameters"][1:].any()
+    assert result.samples["executed"].tolist() == [True] + [False] * 5
+    assert (result.player_cycles, result.idle, result.frozen) == (8, 6, 1)
+
+
+def test_without_a_command_log_nobody_is_known_to_do_nothing() -> None:
+    frames, players = made_match()
+    result = clean_match(frames, players, table(), {}, side=1, repertoire=(*CLONED, "none"))
+    assert len(result.samples["kind"]) == len(result.frames["cycle"]) == 0
+
+
 @pytest.fixture(scope="module")
 def real(samples_dir: Any) -> Any:
     return read_match(next(samples_dir.glob("*-HELIOS_base_8-vs-WEBase_0.rcg.xz")))
@@ -232,7 +335,7 @@ def real(samples_dir: Any) -> Any:
 def _agreement(match: Any, shift: int) -> float:
     """Share of first body commands in play_on whose kind the counters confirm, bound ``shift`` frames off."""
     commands, mode = match.commands, match.frames["playmode"]
-    first = first_body_commands(commands, mode, play_on=PlayMode.PLAY_ON)
+    first = first_body_commands(commands, mode)
     frame: NDArray[np.int64] = commands["frame"][first].astype(np.int64) + shift
     slot = slot_of(commands["side"], commands["unum"])[first]
     inside = (frame >= 0) & (frame < len(mode) - 1)
@@ -245,6 +348,24 @@ def test_binding_agrees_with_the_counters_of_a_real_match_and_only_unshifted(rea
     assert _agreement(real, 0) > 0.999
     assert _agreement(real, 1) < 0.9
     assert _agreement(real, -1) < 0.9
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_real_match_beyond_play_on(real: Any, side: int) -> None:
+    """Every command of the team is executed, also where the clock stands, and a move leads where it says."""
+    match = real.frames, real.players, real.commands, real.game.server_params
+    result = clean_match(*match, side=side, keep=Commands.RECEIVED, repertoire=REPERTOIRE)
+    kind, frame, player = (result.samples[name] for name in ("kind", "frame", "player"))
+    given = kind != REPERTOIRE.index("none")
+    assert result.samples["executed"][given].mean() > 0.9995
+    stands = np.isin(SITUATION[result.frames["playmode"][frame]], [Situation.GOAL, Situation.FAULT])
+    assert result.samples["executed"][given & stands].all()
+    moves = np.flatnonzero(kind == REPERTOIRE.index("move"))
+    assert len(moves) > 20
+    # Collisions push players apart by centimetres.
+    after = result.frames["position"][frame[moves] + 1, player[moves]]
+    assert np.abs(after - result.samples["parameters"][moves]).max() < 0.5
+    assert result.frozen == result.idle == (~given).sum()
 
 
 def test_a_real_match_keeps_the_world_through_the_dataset(real: Any) -> None:

@@ -13,8 +13,9 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import DatasetError
 from teamclone.models.state import CHANNEL, TYPE_FIELD
-from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.player_types import FIELDS
+from teamclone.rcss.playmodes import PlayMode
 
 
 def tiny(folder: Path, **changes: np.ndarray) -> Path:
@@ -62,6 +63,45 @@ def test_rows_become_raw_states(tmp_path: Path) -> None:
     target = dataset.target(rows)
     assert target.kind.tolist() == [2, 0, 2]
     assert target.parameters.tolist() == [[80, -45], [0, 0], [80, -45]]
+
+
+def test_the_play_mode_is_seen_from_the_modelled_teams_side(tmp_path: Path) -> None:
+    """Of two matches, the team on the right in the second; a mode begins anew where frames are left out."""
+    make_dataset(tmp_path / "ds", frames_per_match=5)
+    made = open_dataset(tmp_path / "ds")
+    modes = [PlayMode.PLAY_ON, *[PlayMode.KICK_IN_L] * 3, PlayMode.GOAL_R]
+    made.frames["playmode"][:10] = torch.tensor(modes * 2)
+    made.frames["cycle"][:10] = torch.tensor([1, 2, 3, 7, 8, 1, 2, 3, 3, 3])
+    made.meta["matches"][1]["side"] = "right"
+    rows = np.array([10 * frame for frame in range(10)])
+    state = made.state(rows)
+    right = [PlayMode.PLAY_ON, *[PlayMode.KICK_IN_R] * 3, PlayMode.GOAL_L]
+    assert state.mode.tolist() == [*modes, *right]
+    assert state.mode_cycles.tolist() == [0, 0, 1, 0, 0, 0, 0, 1, 2, 0]
+    assert made.mode(rows).tolist() == state.mode.tolist()
+
+
+def test_further_commands(tmp_path: Path) -> None:
+    assert open_dataset(make_dataset(tmp_path / "four", frames_per_match=1)).commands == CLONED
+    dataset = open_dataset(make_dataset(tmp_path / "all", frames_per_match=30, commands=REPERTOIRE))
+    assert dataset.commands == REPERTOIRE
+    assert set(dataset.samples["kind"].tolist()) == set(range(7))
+    # What was done last: CommandKind ids, 0 for nothing.
+    kinds = dataset.frames["code"][dataset.samples["frame"].long(), dataset.samples["player"].long()]
+    last = dataset.last_kind(np.arange(len(dataset)))
+    expected = {0: "none", **{CommandKind[name.upper()]: name for name in REPERTOIRE[:-1]}}
+    assert [REPERTOIRE[index] for index in last] == [expected[kind] for kind in kinds[:, CODE["last_command"]].tolist()]
+
+
+@pytest.mark.parametrize("commands", [["dash"], [*CLONED, "none", "catch"], [*CLONED, "jump"]])
+def test_commands_that_no_dataset_has_are_told(tmp_path: Path, commands: list[str]) -> None:
+    folder = make_dataset(tmp_path / "ds", frames_per_match=1)
+    document = json.loads((folder / "dataset.json").read_text())
+    (folder / "dataset.json").write_text(json.dumps(document | {"commands": commands}))
+    with pytest.raises(
+        DatasetError, match="expected commands dash, turn, kick, tackle and then, in this order, some of"
+    ):
+        open_dataset(folder)
 
 
 def test_what_the_log_lacks_is_nan(tmp_path: Path) -> None:

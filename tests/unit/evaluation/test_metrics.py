@@ -9,6 +9,7 @@ import pytest
 
 from teamclone.evaluation import metrics, paper
 from teamclone.evaluation.outcome import Outcome
+from teamclone.rcss.commands import REPERTOIRE
 
 DASH, TURN, KICK, TACKLE = range(4)
 
@@ -190,4 +191,6 @@ def test_parameter_log_loss_is_summed_by_match_and_command_given() -> None:
 
 def test_an_even_guess_spreads_over_the_range_of_each_parameter() -> None:
     power, angle = math.log(100), math.log(360)
-    np.testing.assert_allclose(metrics.EVEN_LOG_LOSS, [power + angle, angle, power + angle, angle])
+    even = list(metrics.even_log_loss(REPERTOIRE).values())
+    length, width = math.log(115), math.log(78)
+    np.testing.assert_allclose(even, [power + angle, angle, power + angle, angle, angle, length + width, 0])

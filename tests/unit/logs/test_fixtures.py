@@ -233,7 +233,7 @@ def test_converted_version_3_says_which_parameters_it_does_not_know(match_of: Ma
 def executed_share(match: Match) -> tuple[float, int]:
     """How often the counters name the first body command that was received, over play_on; and of how many."""
     frames, commands = match.frames, match.commands
-    index = first_body_commands(commands, frames["playmode"], play_on=PlayMode.PLAY_ON)
+    index = first_body_commands(commands, frames["playmode"])
     frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
     # At half time the next frame also shows what was commanded without a frame.
     followed = np.append(np.diff(frames["cycle"]) <= 1, False)

@@ -41,7 +41,7 @@ def test_the_command_log_explains_the_bodies(match_of: MatchOf, name: str):
     """After a dash the body points where it did, after most turns it does not: frames and commands fit together."""
     match = match_of(name)
     frames, commands = match.frames, match.commands
-    index = first_body_commands(commands, frames["playmode"], play_on=PlayMode.PLAY_ON)
+    index = first_body_commands(commands, frames["playmode"])
     frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
     use = (frames["playmode"][frame] == PlayMode.PLAY_ON) & np.append(np.diff(frames["cycle"]) == 1, False)[frame]
     index, frame, slot = index[use], frame[use], slot[use]

@@ -13,6 +13,7 @@ from teamclone.models.features import PaperFeatures
 from teamclone.models.mirror import mirror_places, mirror_state, mirror_target
 from teamclone.models.relative import GEOMETRY, RelativeFeatures
 from teamclone.models.state import CHANNEL, State, Target
+from teamclone.rcss.commands import CLONED, REPERTOIRE
 
 # 4-3-3: goalkeeper, centre backs 2 3, full backs 4 5, and so on; numbers of a side need not be neighbours.
 FORMATION = np.array(
@@ -75,6 +76,14 @@ def test_a_mirrored_command_by_hand() -> None:
     mirrored = mirror_target(target)
     assert torch.equal(mirrored.kind, target.kind)
     assert mirrored.parameters.tolist() == [[50, 90], [-45, 0], [100, -179], [18, 0]]
+
+
+def test_a_mirrored_catch_and_move_by_hand() -> None:
+    parameters = torch.tensor([[30.0, 0.0], [-20.0, 7.0], [0.0, 0.0], [-18.0, 0.0]])
+    mirrored = mirror_target(Target(torch.tensor([4, 5, 6, 1]), parameters), REPERTOIRE)
+    assert mirrored.parameters.tolist() == [[-30, 0], [-20, -7], [0, 0], [18, 0]]
+    without_catch = mirror_target(Target(torch.tensor([4]), parameters[1:2]), (*CLONED, "move"))
+    assert without_catch.parameters.tolist() == [[-20, -7]]
 
 
 def test_the_papers_inputs_of_a_mirrored_state(state: State) -> None:

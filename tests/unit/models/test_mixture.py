@@ -15,10 +15,12 @@ from teamclone.models.mixture import (
     LEAST_POWER,
     Mixture,
     angle_terms,
+    clipped_terms,
     halves,
     log_likelihood,
     merged,
     middle,
+    middle_place,
     mirrored,
     power_terms,
     scale_of,
@@ -59,6 +61,22 @@ def test_powers_with_their_bounds_make_up_one(centre: list[float], scale: list[f
     low, high = power_likelihood(parts, double(0.0, 100.0)).tolist()
     # Of the hundredth beside each bound, which counts as clipped, the density is left out.
     assert inside + low + high == pytest.approx(1, abs=0.06 if min(scale) < 1 else 2e-3)
+
+
+def test_places_with_their_bounds_make_up_one() -> None:
+    parts = repeated(mixture([-20.0, 60.0], [1.0, 4.0], [0.3, -1.0]), 115_000)
+    inner = torch.linspace(-57.489, 57.489, 115_000, dtype=torch.float64)
+    at = [log_likelihood(parts.logits, clipped_terms(parts, x, low=-57.5, high=57.5)).exp() for x in (inner, -inner)]
+    assert torch.equal(at[1], at[0].flip(0))
+    ends = repeated(mixture([-20.0, 60.0], [1.0, 4.0], [0.3, -1.0]), 2)
+    beyond = log_likelihood(ends.logits, clipped_terms(ends, double(-57.5, 57.5), low=-57.5, high=57.5)).exp()
+    assert float(torch.trapezoid(at[0], inner) + beyond.sum()) == pytest.approx(1, abs=2e-3)
+
+
+def test_the_middle_place_is_that_of_a_component() -> None:
+    x, y = double(-40.0, -40.0, -10.0)[None], double(13.0, -13.0, 0.0)[None]
+    chosen = [middle_place(torch.log(double(*shares))[None], x, y)[0].tolist() for shares in ((5, 4, 1), (4, 5, 1))]
+    assert chosen == [[-40, 13], [-40, -13]]
 
 
 def test_a_power_at_its_bound_is_all_beyond() -> None:

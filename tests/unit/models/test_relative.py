@@ -8,12 +8,20 @@ import torch
 from tests.situations import put, resting, situations
 from torch import Tensor
 
-from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING, FLAG_YELLOW
+from teamclone.dataset.layout import (
+    FLAG_CHARGED,
+    FLAG_COLLIDED,
+    FLAG_GOALIE,
+    FLAG_ON_FIELD,
+    FLAG_TACKLING,
+    FLAG_YELLOW,
+)
 from teamclone.models.config import BLOCKS
 from teamclone.models.mirror import mirror_state
 from teamclone.models.relative import CLIP, GEOMETRY, MATES, NEAREST_OPPONENTS, PAST_FRAMES, RIVALS, RelativeFeatures
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.playmodes import PlayMode
 
 PARTS = ("scene", *BLOCKS, "geometry")
 FEATURES = RelativeFeatures()
@@ -121,6 +129,21 @@ def test_role_last_and_view() -> None:
     assert seen(state, "role") == [1] + [0] * 10
     assert seen(state, "last") == [0, 0, 1, 0, 0, 0, 0, 1, 0]
     assert seen(state, "view") == pytest.approx([math.cos(math.pi / 6), -0.5, 1 / 3])
+
+
+def test_mode() -> None:
+    state = standing()
+    assert seen(state, "mode") == [0, 1] + [0] * 20
+    state.mode[:], state.mode_cycles[:] = PlayMode.KICK_OFF_L, 5
+    put(state, 0, flags=FLAG_ON_FIELD | FLAG_GOALIE)
+    assert seen(state, "mode") == pytest.approx([0, 0, 0, 1, 0] + [0] * 14 + [0.5, 0.05, 1])
+    # The last two kinds are goals and faults; the modelled team scored, so the others restart.
+    state.mode[:], state.mode_cycles[:] = PlayMode.GOAL_L, 300
+    assert seen(state, "mode")[15:] == [0, 1, 0, 0, 1, 1, 1]
+    state.mode[:] = PlayMode.FOUL_CHARGE_R
+    assert seen(state, "mode")[15:19] == [0, 0, 1, 0]
+    state.mode[:] = PlayMode.PENALTY_TAKEN_R
+    assert seen(state, "mode")[:3] == [1, 0, 0]
 
 
 def test_own_kick_is_not_that_of_a_team_mate() -> None:
@@ -459,6 +482,9 @@ MEETING = {"scene", "reach", "geometry", "lines", "mates", "opponents", "rivals"
         ("ball", lambda s: s.ball[:, 0].add_(0.5), {"ball"} | MEETING, set()),
         ("past ball", lambda s: s.past_ball[:, 2].add_(0.5), {"past"}, set()),
         ("own past", lambda s: s.past_players[:, 1, 2, CHANNEL["vx"]].add_(0.1), {"past"}, set()),
+        ("play mode", lambda s: s.mode.fill_(PlayMode.KICK_IN_R), {"mode"}, set()),
+        ("its cycles", lambda s: s.mode_cycles.add_(3), {"mode"}, set()),
+        ("goalkeeper", lambda s: s.players[:, 2, CHANNEL["flags"]].add_(FLAG_GOALIE), {"mode"}, set()),
         ("others' past", lambda s: s.past_players[:, :, 3:, CHANNEL["x"]].add_(0.5), set(), set()),
     ],
 )  # fmt: skip

@@ -144,6 +144,14 @@ def test_a_setting_without_effect_is_refused() -> None:
         load_config("small", ["train.optimiser=rmsprop", "train.betas=[0.8, 0.9]"])
 
 
+@pytest.mark.parametrize("text", ["dash,turn", "turn,dash,kick,tackle", "dash,turn,kick,tackle,none,move"])
+def test_commands_have_their_order(text: str) -> None:
+    with pytest.raises(
+        UsageError, match="expected dash, turn, kick, tackle and then, in this order, some of catch, mo"
+    ):
+        load_config("paper", [f"model.commands={text}"])
+
+
 MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidden=[8]"]
 
 

@@ -22,7 +22,7 @@ def make_dataset(
 
     What a player does follows from where he stands: beyond x = 35 he kicks, beyond |y| = 28 he tackles, in his own
     half he turns, else he dashes; parameters follow from his place and body. Further ``commands`` are given in strips
-    of six metres from the half-way line on.
+    of eleven metres from the half-way line on.
     """
     rng = np.random.default_rng(seed)
     splits = list(Split)
@@ -57,7 +57,7 @@ def make_dataset(
     parameters[kind == 2] = np.stack([x, y * 4], 1)[kind == 2]
     parameters[kind == 3, 0] = -y[kind == 3]
     for index, name in enumerate(commands[len(CLONED) :]):
-        strip = (kind == 0) & (x >= 6 * index) & (x < 6 * index + 6)
+        strip = (kind == 0) & (x >= 11 * index) & (x < 11 * index + 11)
         kind[strip] = len(CLONED) + index
         given = {"catch": (-2 * y, 0 * y), "move": (-x, y / 2), "none": (0 * x, 0 * y)}[name]
         parameters[strip] = np.stack(given, 1)[strip]

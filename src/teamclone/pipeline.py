@@ -119,11 +119,22 @@ def load_pipeline(path: Path) -> Pipeline:
             for name, share in shares.items()
             if not 0 <= share <= MAX_SHARE
         ]
+        try:
+            config.check()
+        except UsageError as error:
+            problems.append(f"dataset: {error}")
     for name, needs in (("train", "dataset"), ("evaluate", "train")):
         if name in table and needs not in table:
             problems.append(f"[{name}] needs [{needs}]")
     if problems:
         raise UsageError(f"{path}: {'; '.join(problems)}")
+    trained = load_config(training.preset, training.set) if "train" in table else None
+    if config and trained and trained.model.commands != config.repertoire:
+        wanted = ",".join(config.repertoire)
+        raise UsageError(
+            f'{path}: train.set: expected "model.commands={wanted}", as [dataset] has them, '
+            f"got {','.join(trained.model.commands)}"
+        )
     location = store.location
     if location and "://" not in location:
         location = str(folder_of(path) / Path(location).expanduser())
@@ -131,7 +142,7 @@ def load_pipeline(path: Path) -> Pipeline:
         plan=plan,
         store=location,
         dataset=config,
-        train=load_config(training.preset, training.set) if "train" in table else None,
+        train=trained,
         checkpoint=evaluation.checkpoint,
     )
 

@@ -400,6 +400,11 @@ def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_p
         ("[teams.Green]\nname = 'Red'\ncommand = 'r'\n", "teams.Green.name: a team is called"),
         ("[dataset]\nteams = 'Red'\n[train]\nset = ['train.epoch=1']\n", "did you mean train.epochs"),
         ("[store]\nplace = 'x'\n", "no setting store.place"),
+        ("[dataset]\nteams = 'Red'\ngoalkeepers = true\ntrain_goalkeepers = true\n", "leave out --train-goalkeepers"),
+        (
+            "[dataset]\nteams = 'Red'\nidle = true\n[train]\npreset = 'small'\n",
+            'train.set: expected "model.commands=dash,turn,kick,tackle,none", as [dataset] has them',
+        ),
     ):
         plan = write_plan(tmp_path, [("Red", "Blue")], more=more)
         done = teamclone("run", plan, "--out", tmp_path / "out", code=2)

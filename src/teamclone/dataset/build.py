@@ -84,6 +84,17 @@ class DatasetConfig:
         wanted = {"catch": self.goalkeepers, "move": self.set_plays, "none": self.idle}
         return tuple(name for name in REPERTOIRE if wanted.get(name, True))
 
+    def check(self) -> None:
+        """See that the options go together.
+
+        Raises:
+            UsageError: they do not.
+        """
+        if self.train_goalkeepers and self.split is SplitBy.ROWS:
+            raise UsageError("--train-goalkeepers keeps goalkeepers out of whole test matches; it needs --split match")
+        if self.train_goalkeepers and self.goalkeepers:
+            raise UsageError("--goalkeepers takes goalkeepers' commands in every split; leave out --train-goalkeepers")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Entry:
@@ -134,10 +145,7 @@ def build_dataset(
         DatasetError: no row is left, or ``out`` cannot be written.
         ClusterError: the connection to the executor's workers was lost.
     """
-    if config.train_goalkeepers and config.split is SplitBy.ROWS:
-        raise UsageError("--train-goalkeepers keeps goalkeepers out of whole test matches; it needs --split match")
-    if config.train_goalkeepers and config.goalkeepers:
-        raise UsageError("--goalkeepers takes goalkeepers' commands in every split; leave out --train-goalkeepers")
+    config.check()
     entries, without_team = _entries(store, config)
     splits = split_matches(
         [MatchKey(match_id=entry.match_id, team=entry.team, opponent=entry.opponent) for entry in entries],

@@ -81,17 +81,8 @@ def train(
             training diverged.
     """
     with ExitStack() as stack:
+        check_commands(config, dataset, adapting=base is not None)
         commands = dataset.commands
-        if config.model.commands != commands:
-            raise UsageError(
-                f"{dataset.path}: has the commands {', '.join(commands)}, the model is for "
-                f"{', '.join(config.model.commands)}; "
-                + (
-                    "make the dataset with the options of that of the base"
-                    if base
-                    else f"add --set model.commands={','.join(commands)}"
-                )
-            )
         device, precision = _resources(config.train)
         group = stack.enter_context(joined(device))
         rows = dataset.split(Split.TRAIN)
@@ -251,6 +242,22 @@ def _kick_order(config: TrainConfig, rows: NDArray[np.int64], *, epoch: int, bat
         return rows[:0]
     random = np.random.default_rng((config.seed, 3, epoch))
     return np.concatenate([random.permutation(rows) for _ in range(math.ceil(wanted / len(rows)))])[:wanted]
+
+
+def check_commands(config: Config, dataset: Dataset, *, adapting: bool = False) -> None:
+    """See that the model answers with what the dataset has.
+
+    Raises:
+        UsageError: it does not.
+    """
+    there, answers = dataset.commands, config.model.commands
+    if answers != there:
+        remedy = f"add --set model.commands={','.join(there)}"
+        if adapting:
+            remedy = "make the dataset with the options of that of the base"
+        raise UsageError(
+            f"{dataset.path}: has the commands {', '.join(there)}, the model is for {', '.join(answers)}; {remedy}"
+        )
 
 
 class Journal:

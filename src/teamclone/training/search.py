@@ -480,9 +480,10 @@ def search(
     trials are kept, unfinished ones go on from their last epoch with what is left of ``train.max_minutes``.
 
     Raises:
-        UsageError: options that do not go together.
+        UsageError: options that do not go together, or a dataset of other commands than the model's.
         RunError: the folder holds something else, or a search that does not fit; or another process searches in it.
     """
+    loop.check_commands(config.base, dataset)
     plan, folder = PLANS[config.mode](config), Path(out)
     if not (folder / "search.json").exists() and folder.exists():
         left = {".lock", ".search.json.part"}  # by a process killed before it wrote anything

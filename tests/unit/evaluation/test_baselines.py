@@ -8,6 +8,7 @@ import pytest
 from teamclone.evaluation import metrics
 from teamclone.evaluation.baselines import NAMES, Baselines, Counter
 from teamclone.evaluation.outcome import Outcome
+from teamclone.rcss.commands import CLONED
 
 # Last command by command given; the last row is "none known". 100 rows: 61 dash, 35 turn, 4 kick.
 TRANSITIONS = np.array([[50, 10, 1, 0], [5, 20, 0, 0], [1, 0, 3, 0], [0, 0, 0, 0], [5, 5, 0, 0]])
@@ -95,3 +96,16 @@ def test_constant_guess_stands_for_every_row(baselines: Baselines) -> None:
     answer = baselines.answer("majority", outcome([0, 1], [0, 0]))
     np.testing.assert_allclose(answer.parameters[:, 0], 80)
     assert np.isnan(answer.parameters[:, 5]).all()
+
+
+def test_rules_know_further_commands() -> None:
+    commands = (*CLONED, "move", "none")
+    counter = Counter.empty(commands)
+    issued = np.full((4, 8), np.nan)
+    issued[:3, 6:] = [(-15, 5), (-15, 10), (-49, 0)]
+    counter.add(kind=np.array([4, 4, 4, 5]), last=np.array([-1, 4, 5, 5]), issued=issued)
+    found = counter.finish()
+    assert found.transitions.shape == (7, 6)
+    np.testing.assert_allclose(found.table("markov")[5], np.array([1, 1, 1, 1, 2, 2]) / 8)
+    np.testing.assert_allclose(found.table("majority")[0], np.array([1, 1, 1, 1, 4, 2]) / 10)
+    assert found.parameters[6:].tolist() == [-15, 5]

@@ -9,7 +9,7 @@ import pytest
 
 from teamclone.evaluation import metrics, paper
 from teamclone.evaluation.outcome import Outcome
-from teamclone.rcss.commands import REPERTOIRE
+from teamclone.rcss.commands import CLONED, REPERTOIRE
 
 DASH, TURN, KICK, TACKLE = range(4)
 
@@ -194,3 +194,34 @@ def test_an_even_guess_spreads_over_the_range_of_each_parameter() -> None:
     even = list(metrics.even_log_loss(REPERTOIRE).values())
     length, width = math.log(115), math.log(78)
     np.testing.assert_allclose(even, [power + angle, angle, power + angle, angle, angle, length + width, 0])
+
+
+def test_figures_of_further_commands() -> None:
+    """A move in metres, which do not wrap, and a command without parameters."""
+    commands = (*CLONED, "move", "none")
+    issued = np.full((3, 8), np.nan, np.float32)
+    issued[0, 6:], issued[1, 2] = (-50, 30), -170
+    predicted = np.zeros((3, 8), np.float32)
+    predicted[0, 6:], predicted[1, 2] = (50, 26), 170
+    made = Outcome(
+        probabilities=np.eye(6, dtype=np.float32)[[4, 0, 5]],
+        parameters=predicted,
+        parameter_log_loss=np.array([2.0, 3.0, np.nan], np.float32),
+        kind=np.array([4, 1, 5]),
+        issued=issued,
+        last=np.array([-1, 5, 0]),
+        match=np.zeros(3, np.int64),
+        position=np.zeros((3, 2), np.float32),
+        mode=np.array([14, 3, 3]),
+        commands=commands,
+    )
+    sums = metrics.measure(made)[1].total()
+    assert sums.confusion.shape == (6, 6)
+    assert (sums.confusion[4, 4], sums.confusion[1, 0], sums.confusion[5, 5]) == (1, 1, 1)
+    assert sums.parameter_error.tolist() == [0, 0, 20, 0, 0, 0, 100, 4]
+    assert sums.likelihood_count.tolist() == [0, 1, 0, 0, 1, 0]
+    errors = (100 / 57.5 + 4 / 39) / 8, (340 / 180) / 8, 0
+    np.testing.assert_allclose(metrics.paper_errors(predicted, issued, commands), errors, rtol=1e-6)
+    assert metrics.median_errors(predicted, issued, commands)[6:].tolist() == [100, 4]
+    some = made.rows(np.array([0, 2]))
+    assert (len(some), some.commands, some.mode.tolist()) == (2, commands, [14, 3])

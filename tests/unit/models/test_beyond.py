@@ -188,3 +188,29 @@ def test_the_papers_parameters_of_a_move_are_bounded_by_the_pitch() -> None:
         model.head.parameter.weight.mul_(1000)
     _, parameters = model.predict(situations(50))
     assert parameters.abs().amax(0).tolist() == pytest.approx([100, 180, 180, 100, 180, 180, 180, MAX_X, MAX_Y])
+
+
+class Exported(torch.nn.Module):
+    """From the tensors of a state, the play mode among them, to the single best answer."""
+
+    def __init__(self, model: Clone) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, *state: Tensor) -> tuple[Tensor, Tensor]:
+        names = ("ball", "players", "types", "actor", "mode", "mode_cycles")
+        logits, parameters = self.model(State.now(**dict(zip(names, state, strict=True))))
+        return logits, parameters
+
+
+def test_a_model_of_all_commands_can_be_exported() -> None:
+    def inputs(n: int) -> tuple[Tensor, ...]:
+        state = situations(n, seed=n)
+        return (*state[:4], state.mode, state.mode_cycles)
+
+    model = Exported(fitted(MIXTURE, situations(50)))
+    batch = torch.export.Dim("batch", min=1)
+    exported = torch.export.export(model, inputs(3), dynamic_shapes=(({0: batch},) * 6,)).module()
+    for n in (1, 3, 17):
+        for one, other in zip(exported(*inputs(n)), model(*inputs(n)), strict=True):
+            assert torch.allclose(one, other, atol=1e-2)

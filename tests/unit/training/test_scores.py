@@ -6,6 +6,7 @@ import torch
 from teamclone.models.loss import Loss
 from teamclone.models.network import Prediction
 from teamclone.models.state import Target
+from teamclone.rcss.commands import CLONED
 from teamclone.training.scores import Scores
 
 CPU = torch.device("cpu")
@@ -43,3 +44,19 @@ def test_figures_by_hand_over_unequal_batches() -> None:
         }
     )
     assert "recall_tackle" not in table
+
+
+def test_further_commands_are_counted() -> None:
+    """A move of 57.5 m where -57.5 was right, beside a cycle without a command."""
+    scores = Scores(CPU, (*CLONED, "move", "none"))
+    said = torch.zeros(2, 8)
+    said[0, 6] = 57.5
+    scores.add(
+        Loss(torch.tensor(1.0), torch.tensor(1.0), torch.tensor(0.0)),
+        Prediction(torch.eye(6)[[4, 0]], said),
+        Target(torch.tensor([4, 5]), torch.tensor([[-57.5, 0.0], [0.0, 0.0]])),
+    )
+    table = scores.table()
+    assert (table["recall_move"], table["recall_none"]) == (1, 0)
+    assert table["parameter_mae"] == pytest.approx(2 / 16)
+    assert table["issued_mae"] == pytest.approx(2 / 2)

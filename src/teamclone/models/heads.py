@@ -202,6 +202,7 @@ class MixtureHead(nn.Module):
     """
 
     temperature: Tensor
+    places: Tensor
 
     def __init__(
         self,
@@ -228,7 +229,7 @@ class MixtureHead(nn.Module):
             self.catch_sharpness = nn.Parameter(torch.tensor(4.0))
         self.move = nn.Linear(parameter_width, 5 * len(MOVE_PLACES)) if "move" in commands else None
         if self.move is not None:
-            self.places = nn.Parameter(torch.tensor(MOVE_PLACES))
+            self.register_buffer("places", torch.tensor(MOVE_PLACES), persistent=False)
         self.register_buffer("temperature", torch.ones(()))
 
     def forward(self, situation: Situation) -> Distribution:

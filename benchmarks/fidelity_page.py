@@ -307,8 +307,8 @@ is off. `ensemble` trains three networks side by side."""
 
 def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
     """Of step k."""
-    made = [name for name in variants if name in results]
-    if not made or "short" not in results:
+    made = [name for name in ("short", *variants, "plain") if name in results]
+    if len(made) < 2:
         return ""
     names = _sets(results)
 
@@ -324,7 +324,7 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
             cell(name, _command("kick", "parameter_log_loss"), 2),
             number(results[name]["seconds"] / 60, 1),
         ]
-        for name in ("short", *made)
+        for name in made
     ]
     headers = (
         *("variant", "settings", "kick direction, mean error, deg", "median error, deg", "kick power, mean error"),
@@ -335,6 +335,7 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
 Where kicks go, and how hard, by what the layers of a kick know of the other players and by how often they see one.
 `short` is the preset `best` on the shorter schedule; in `without-attention` they know only the two nearest of each side
 to the ball, in `lists` the ten team mates, the six nearest opponents and the three nearest the ball, in a fixed order.
+`plain` is `lists` without kicks beside the batches.
 
 {table(headers, rows)}"""
 

@@ -144,6 +144,9 @@ def test_relative_inputs_and_mixtures_are_adapted_too(team: Dataset, tmp_path: P
     assert weights(run)["base"] != weights(run)["last"]
     begun, best = (load_file(path) for path in (run.checkpoint_path("base"), first.checkpoint_path("best-loss")))
     assert all(torch.equal(begun[name], best[name]) for name in begun | best)
+    # As many kicks to a sample as in the base, whose batches of 64 had 128.
+    for changes, kicks in (((), 2048), (("data.batch_size=3",), 6), (("data.batch_size=3", "train.kicks=5"), 5)):
+        assert adaptation(first, changes)[0].train.kicks == kicks
 
 
 def test_the_temperature_of_the_base_is_not_kept(team: Dataset, tmp_path: Path) -> None:

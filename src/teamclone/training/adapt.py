@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,8 +32,8 @@ def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
     """What `loop.train` needs to adapt a run: the settings and where to begin.
 
     The network and its settings are those of the base, and so is the normalisation of its inputs, so that each input
-    means what it meant. The other settings are those of the base but for SETTINGS and what ``overrides`` say, each
-    ``section.key=value``.
+    means what it meant. The other settings are those of the base but for SETTINGS, kicks in proportion to the batch,
+    and what ``overrides`` say, each ``section.key=value``.
 
     Raises:
         UsageError: a setting is unknown or wrong, or one of the network's.
@@ -45,6 +46,9 @@ def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
             "expected settings of data and train, or train a new clone with `teamclone train`"
         )
     config = override(base.config, [*SETTINGS, *overrides])
+    if not any(text.partition("=")[0].strip() == "train.kicks" for text in overrides):
+        share = config.data.batch_size / base.config.data.batch_size
+        config = override(config, [f"train.kicks={math.ceil(share * base.config.train.kicks)}"])
     model = base.load_model(CHECKPOINT)
     origin = {
         "path": str(base.path),

@@ -88,6 +88,8 @@ class Work:
             *("--commands", "received", *self.held_out, "--json"),
             *("--matches", *map(str, COUNTS)),
         ]
+        text = " ".join(("python benchmarks/adapting.py", *command[1:]))
+        self.commands.append(text.replace(str(self.out), "DIR"))
         if not path.is_file():
             print(f"{path} ...", file=sys.stderr, flush=True)
             with path.with_suffix(".part").open("wb") as file:

@@ -30,7 +30,7 @@ from teamclone.dataset.layout import (
 )
 from teamclone.errors import DatasetError
 from teamclone.models.state import State, Target
-from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
+from teamclone.rcss.commands import CLONED, CommandKind, not_of_repertoire
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.playmodes import OTHER_SIDE
 
@@ -206,12 +206,8 @@ def open_dataset(path: Path | str) -> Dataset:
     absent = [key for key in ("id", "team", "matches", "n_frames", "n_samples") if key not in meta]
     if absent:
         raise DatasetError(f"{document}: lacks {', '.join(absent)}; make it again with `teamclone dataset`")
-    commands = tuple(meta.get("commands", CLONED))
-    if commands[: len(CLONED)] != CLONED or commands != tuple(name for name in REPERTOIRE if name in commands):
-        raise DatasetError(
-            f"{document}: expected commands {', '.join(CLONED)} and then, in this order, some of "
-            f"{', '.join(REPERTOIRE[len(CLONED) :])}; got {', '.join(commands)}; make it again with `teamclone dataset`"
-        )
+    if wrong := not_of_repertoire(tuple(meta.get("commands", CLONED))):
+        raise DatasetError(f"{document}: expected commands {wrong}; make it again with `teamclone dataset`")
     types = _open(folder / "player_types.npy", dtype="float32", shape=(len(meta["matches"]), None, len(FIELDS)))
     return Dataset(
         path=folder.resolve(),

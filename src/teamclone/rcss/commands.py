@@ -75,6 +75,14 @@ Every dataset and every model has the first four, so that places of these and of
 """
 
 
+def not_of_repertoire(commands: tuple[str, ...]) -> str | None:
+    """What the commands of a dataset or model have to be, and what these are; None where they can be these."""
+    further = REPERTOIRE[len(CLONED) :]
+    if commands == (*CLONED, *(name for name in further if name in commands)):
+        return None
+    return f"{', '.join(CLONED)} and then, in this order, some of {', '.join(further)}; got {', '.join(commands)}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
     """One parameter of a cloned command: its command, its place in the command, its unit and range."""

@@ -11,7 +11,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from teamclone.errors import UsageError, choose
 from teamclone.models.config import ACTIVATIONS, ATTENTION_HEADS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
-from teamclone.rcss.commands import CLONED, REPERTOIRE
+from teamclone.rcss.commands import REPERTOIRE, not_of_repertoire
 from teamclone.rcss.player_types import GROUPS
 from teamclone.settings import value_of
 
@@ -323,14 +323,8 @@ def _converted(key: str, value: Any, hint: Any) -> Any:
             raise UsageError(f"{key}: names one more than once: {', '.join(converted)}")
         if key == "model.hidden" and not converted:
             raise UsageError(f"{key}: expected at least one width")
-        if key == "model.commands" and converted != (
-            *CLONED,
-            *(name for name in REPERTOIRE[len(CLONED) :] if name in converted),
-        ):
-            raise UsageError(
-                f"{key}: expected {', '.join(CLONED)} and then, in this order, some of "
-                f"{', '.join(REPERTOIRE[len(CLONED) :])}; got {', '.join(converted)}"
-            )
+        if key == "model.commands" and (wrong := not_of_repertoire(converted)):
+            raise UsageError(f"{key}: expected {wrong}")
         return converted
     return _scalar(key, value, hint)
 

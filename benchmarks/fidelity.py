@@ -1,6 +1,6 @@
 """How faithful a clone is: baselines, presets, what each part gains, and why it stops; then writes the results page.
 
-    python benchmarks/fidelity.py MATCHES --out DIR [--only c,b,a,k,f,d,e,g] [--page docs/fidelity.md]
+    python benchmarks/fidelity.py MATCHES --out DIR [--only c,t,b,a,k,f,d,e,g] [--page docs/fidelity.md]
 
 MATCHES is a folder of logs. Steps, in the order in which --only names them:
 
@@ -8,6 +8,7 @@ MATCHES is a folder of logs. Steps, in the order in which --only names them:
     b  preset paper, eight minutes       d  preset best without each of its parts, on a shorter schedule
     a  rules, gradient-boosted trees     e  remedies for rare commands, on the same shorter schedule
     k  how kicks come to know others     g  what is left: from the results of c and f
+    t  preset best, otherwise trained
 
 --only also takes single results by name. Each result is a file DIR/results/NAME.json; what is there is not done again,
 and a training that was interrupted goes on. The page is written anew at the end from the results that there are.
@@ -56,7 +57,7 @@ from teamclone.training.run import is_run, open_run
 FORMAT = 1
 """Of the result files; raised whenever they would be misread."""
 TEST_MATCHES = ("20261122110359", "20261122112951")
-STEPS = "cbakfdeg"
+STEPS = "ctbakfdeg"
 SEEDS = (0, 1, 2)
 PAPER_MINUTES = 8.0
 SHORT_EPOCHS = 6
@@ -73,9 +74,17 @@ PLAIN = (
     "model.kick_blocks=self,type,last,ball,reach,lines,mates,opponents,rivals",
     "model.kick_attention=0",
     "train.kicks=0",
+    "train.optimiser=adam",
+    "data.mirror=0.0",
 )
-"""Kicks as they were without attention: what changes nothing of kicks is compared with these settings. The layers of
-the command share nothing with those of kicks, and these take a third of the time."""
+"""Kicks without attention, samples as they are, Adam: what changes none of these is compared with these settings. The
+layers of the command share nothing with those of kicks, and these take a third of the time."""
+TRAINING: dict[str, tuple[str, ...]] = {
+    "adam": ("train.optimiser=adam",),
+    "without-mirror": ("data.mirror=0.0",),
+}
+"""How the preset is trained: name and settings beside its own, in its full length; what keeps a network from learning
+its matches by heart pays in the last epochs only."""
 KICKS: dict[str, tuple[str, ...]] = {
     "without-attention": ("model.kick_attention=0",),
     "lists": PLAIN[:2],
@@ -170,6 +179,11 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
             overrides=(*tiny, *(epochs(usual) if scale != 1 else ()), f"train.seed={seed}"),
         )
         for seed in SEEDS
+    ]
+    full = (*tiny, *(epochs(usual) if scale != 1 else ()))
+    made += [
+        Experiment(name=name, step="t", preset="best", overrides=(*full, *changes))
+        for name, changes in TRAINING.items()
     ]
     minutes = (f"train.max_minutes={PAPER_MINUTES * scale:g}",)
     made.append(Experiment(name="paper", step="b", preset="paper", overrides=TINY if quick else minutes))
@@ -660,7 +674,7 @@ def main() -> None:
         page,
         results=work.load(),
         left=json.loads(left.read_text(encoding="utf-8")) if left.is_file() else {},
-        variants={"k": KICKS, "d": ablations(), "e": REMEDIES},
+        variants={"t": TRAINING, "k": KICKS, "d": ablations(), "e": REMEDIES},
         cleaning=work.dataset.meta["cleaning"],
         commands=[work.told(command) for command in work.commands],
         situations=SITUATIONS,

@@ -81,13 +81,14 @@ def write(
     """Write the page, and beside it the plot of the learning curve.
 
     Args:
-        results: by name. left: of step g. variants: settings of steps k, d and e by name.
+        results: by name. left: of step g. variants: settings of steps t, k, d and e by name.
         cleaning: the dataset's report; None where nothing was run. commands: that made store and dataset.
     """
     parts = [_head(results)]
     if results and cleaning is not None:
         parts += [_protocol(cleaning)]
     parts += [_goals(results), _spread(results), _numbers(results), _likelihood(results)]
+    parts += [_variants("Training", TRAINING_TEXT, results, variants.get("t", {}), beside="best-0")]
     parts += [_kicks(results, variants.get("k", {}))]
     parts += [_variants("What each part gains", ABLATIONS_TEXT, results, variants.get("d", {}))]
     parts += [_variants("Rare commands", REMEDIES_TEXT, results, variants.get("e", {}), rare=True)]
@@ -300,6 +301,8 @@ ABLATIONS_TEXT = """`without-X` leaves a block of inputs out, of the command's a
 adds one to the command's part; the others change what their settings say. Changes are to `plain`, which has the other
 players of a kick as lists of the nearest, on the shorter schedule: positive nats are worse, of the command's
 cross-entropy and of the log loss of parameters alike."""
+TRAINING_TEXT = """How the preset is trained, beside `best-0`, each in its full length: `adam` moves all weights by
+Adam, as the paper does; `without-mirror` sees the training matches only as they were played."""
 REMEDIES_TEXT = """What is said to help with rare commands, beside `plain` on the same shorter schedule. The
 class probabilities of balanced trainings are corrected for the balance unless `train.prior_correction`
 is off. `ensemble` trains three networks side by side."""
@@ -341,16 +344,22 @@ to the ball, in `lists` the ten team mates, the six nearest opponents and the th
 
 
 def _variants(
-    heading: str, text: str, results: Results, variants: Mapping[str, Sequence[str]], *, rare: bool = False
+    heading: str,
+    text: str,
+    results: Results,
+    variants: Mapping[str, Sequence[str]],
+    *,
+    beside: str = "plain",
+    rare: bool = False,
 ) -> str:
-    """Results of one step beside `plain`."""
+    """Results of one step beside another result."""
     made = [name for name in variants if name in results]
-    if not made or "plain" not in results:
+    if not made or beside not in results:
         return ""
-    names, base = _sets(results), results["plain"]
+    names, base = _sets(results), results[beside]
     accuracy, entropy = FIGURES[0][1], FIGURES[1][1]
     rows = []
-    for name in ("plain", *made):
+    for name in (beside, *made):
         several = [results[name]]
 
         def change(find: Callable[[Any], Any], digits: int, factor: float = 1.0, *, of: Any = several) -> str:
@@ -360,9 +369,9 @@ def _variants(
 
         cells = [
             " / ".join(number(mean(several, item, entropy), 3) for item in names),
-            NOTHING if name == "plain" else change(entropy, 4),
+            NOTHING if name == beside else change(entropy, 4),
             " / ".join(number(mean(several, item, accuracy), 3) for item in names),
-            NOTHING if name == "plain" else change(accuracy, 2, 100),
+            NOTHING if name == beside else change(accuracy, 2, 100),
         ]
         if rare:
             for kind in ("kick", "tackle"):
@@ -375,8 +384,8 @@ def _variants(
         else:
             for kind in ("dash", "turn", "kick"):
                 loss = _command(kind, "parameter_log_loss")
-                cells.append(NOTHING if name == "plain" else change(loss, 3))
-        settings = "" if name == "plain" else ", ".join(f"`{setting}`" for setting in variants[name])
+                cells.append(NOTHING if name == beside else change(loss, 3))
+        settings = "" if name == beside else ", ".join(f"`{setting}`" for setting in variants[name])
         rows.append([f"`{name}`", settings, *cells, number(results[name]["seconds"] / 60, 1)])
     headers = ["variant", "settings", "cross-entropy", "change, nats", "accuracy", "change, points"]
     if rare:

@@ -122,7 +122,7 @@ def test_interrupted_and_resumed_is_as_never_interrupted(
     assert weights(resumed) == weights(whole)
 
 
-@pytest.mark.parametrize("optimiser", ["rmsprop", "adagrad"])
+@pytest.mark.parametrize("optimiser", ["rmsprop", "adagrad", "muon"])
 def test_resume_with_every_optimiser(dataset: Dataset, tmp_path: Path, optimiser: str) -> None:
     config = tiny(f"train.optimiser={optimiser}")
     whole = train(config, dataset, tmp_path / "whole")

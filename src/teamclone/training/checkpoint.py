@@ -12,6 +12,7 @@ from torch import nn
 
 from teamclone.errors import RunError
 from teamclone.files import write_atomic
+from teamclone.training.optimiser import Optimiser
 
 
 def save_weights(path: Path, model: nn.Module, *, epoch: int) -> None:
@@ -31,7 +32,7 @@ def load_weights(path: Path, model: nn.Module) -> int:
     return epoch
 
 
-def save_progress(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer, *, epoch: int) -> None:
+def save_progress(path: Path, model: nn.Module, optimiser: Optimiser, *, epoch: int) -> None:
     """All that the next epoch depends on beside config and dataset."""
     tensors = {f"model.{name}": tensor.contiguous().cpu() for name, tensor in model.state_dict().items()}
     for index, state in optimiser.state_dict()["state"].items():
@@ -39,7 +40,7 @@ def save_progress(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer
     write_atomic(path, safetensors.torch.save(tensors, metadata={"epoch": str(epoch)}))
 
 
-def load_progress(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer) -> int:
+def load_progress(path: Path, model: nn.Module, optimiser: Optimiser) -> int:
     """Bring model and optimiser to where `save_progress` left them; gives the number of finished epochs."""
     tensors, epoch = _read(path)
     weights: dict[str, torch.Tensor] = {}

@@ -42,11 +42,11 @@ class TrainConfig:
 
     Attributes:
         epochs: slices of the training samples to go through.
-        optimiser: adam, rmsprop or adagrad.
+        optimiser: adam, rmsprop, adagrad; or muon: Muon of the hidden layers' matrices, Adam of all other weights.
         learning_rate: the highest.
         schedule: constant; or cosine, which rises over the first WARM_UP batches and falls to zero over all epochs.
-        weight_decay: decoupled from the gradient (AdamW); adam only.
-        betas: Adam's two decay rates; no other optimiser has them.
+        weight_decay: decoupled from the gradient (AdamW); adam and muon only.
+        betas: Adam's two decay rates; adam and muon only.
         epsilon: added to the optimiser's denominator.
         parameter_loss: "paper": all six parameters, zero where not issued; "masked": issued ones only.
         parameter_weight: of the parameters' error beside that of the command.
@@ -99,6 +99,8 @@ class Config:
 MAY_CHANGE = ("train.epochs", "train.max_minutes")
 """Settings that a resumed run may have otherwise than before: they do not change what an epoch does."""
 
+WITH_ADAM = ("adam", "muon")
+"""Optimisers that have Adam's settings."""
 _CHOICES: dict[str, tuple[str, ...]] = {
     "model.commands": REPERTOIRE,
     "model.features": FEATURE_SETS,
@@ -108,7 +110,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "model.kick_blocks": BLOCKS,
     "model.head": HEADS,
     "train.schedule": ("constant", "cosine"),
-    "train.optimiser": ("adam", "rmsprop", "adagrad"),
+    "train.optimiser": ("adam", "rmsprop", "adagrad", "muon"),
     "train.parameter_loss": ("paper", "masked"),
     "train.balance": ("none", "oversample", "undersample", "weights"),
     "train.precision": ("auto", "fp32", "bf16"),
@@ -243,7 +245,7 @@ def _idle(config: Config) -> list[str]:
     def idle(names: Iterable[str], beside: str) -> None:
         problems.extend(f"{name} has no effect with {beside}; leave it out" for name in names if name in changed)
 
-    if train.optimiser != "adam":
+    if train.optimiser not in WITH_ADAM:
         idle(("train.betas", "train.weight_decay"), f"train.optimiser = {train.optimiser}")
     if train.balance == "none":
         idle(("train.balance_strength", "train.prior_correction"), "train.balance = none")

@@ -31,6 +31,7 @@ from teamclone.training.checkpoint import load_progress, load_weights, save_prog
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
 from teamclone.training.feed import Feed
 from teamclone.training.group import joined, local_rank
+from teamclone.training.optimiser import Optimiser, optimiser_of
 from teamclone.training.run import BASE, BEST, RESUME, Base, Run, create_run, locked, open_run, save_config
 from teamclone.training.scores import Scores
 
@@ -112,7 +113,7 @@ def train(
         run = group.first(begin)
         torch.manual_seed(config.train.seed)
         model = Clone(config.model).to(device)
-        optimiser = _optimiser(config.train, model)
+        optimiser = optimiser_of(config.train, model, precision=precision)
         for split_rows in (rows, validation_rows):
             _check_whole(model, dataset, split_rows)
         feed = Feed(
@@ -276,7 +277,7 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self.board.close()
 
-    def write(self, record: dict[str, Any], model: Clone, optimiser: torch.optim.Optimizer) -> None:
+    def write(self, record: dict[str, Any], model: Clone, optimiser: Optimiser) -> None:
         """Write an epoch. A kill before the last file repeats the epoch, which writes the same again."""
         epoch, run = record["epoch"], self.run
         with run.metrics_path.open("a", encoding="utf-8") as file:
@@ -328,20 +329,6 @@ def has_fast_bfloat16(device: torch.device) -> bool:
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))
     able = torch.cpu.get_capabilities()
     return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
-
-
-def _optimiser(config: TrainConfig, model: Clone) -> torch.optim.Optimizer:
-    weights, rate, epsilon = model.parameters(), config.learning_rate, config.epsilon
-    if config.optimiser == "rmsprop":
-        return torch.optim.RMSprop(weights, lr=rate, eps=epsilon)
-    if config.optimiser == "adagrad":
-        return torch.optim.Adagrad(weights, lr=rate, eps=epsilon)
-    betas = (config.betas[0], config.betas[1])
-    if config.weight_decay:
-        return torch.optim.AdamW(
-            weights, lr=rate, betas=betas, eps=epsilon, weight_decay=config.weight_decay, fused=True
-        )
-    return torch.optim.Adam(weights, lr=rate, betas=betas, eps=epsilon, fused=True)
 
 
 def balanced(

@@ -31,7 +31,7 @@ from teamclone.models.config import ACTIVATIONS
 from teamclone.models.network import Clone, parameter_count
 from teamclone.store.workers import available_cpus, start_worker
 from teamclone.training import loop
-from teamclone.training.config import Config, TrainConfig, config_from, differences, to_table
+from teamclone.training.config import WITH_ADAM, Config, TrainConfig, config_from, differences, to_table
 from teamclone.training.run import is_run, locked, open_run, save_config
 
 FORMAT = 1
@@ -323,7 +323,7 @@ class Study:
             "model.dropout": FloatDistribution(0.0, 0.5, step=0.05),
             "model.activation": CategoricalDistribution(ACTIVATIONS),
         }
-        if base.train.optimiser == "adam":
+        if base.train.optimiser in WITH_ADAM:
             space["train.weight_decay"] = FloatDistribution(1e-5, 1e-1, log=True)
         if base.model.features == "relative":
             space["train.parameter_weight"] = FloatDistribution(1e-2, 1.0, log=True)

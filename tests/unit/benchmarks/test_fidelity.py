@@ -104,7 +104,7 @@ def test_every_experiment_is_a_training_of_its_own(quick: bool) -> None:
         configs[name] for name in (*fidelity.KICKS, *fidelity.ablations(), *fidelity.REMEDIES, "short", "plain")
     ]
     assert all(one != other for i, one in enumerate(variants) for other in variants[:i])
-    assert {experiment.step for experiment in made} == {"c", "b", "k", "f", "def", "d", "e"}
+    assert {experiment.step for experiment in made} == {"c", "t", "b", "k", "f", "def", "d", "e"}
     if not quick:
         assert configs["short"].train.epochs == 3
         assert configs["curve-1"].train.epochs == round(3 * 22**0.5)

@@ -299,8 +299,8 @@ degree; lower is better.
 
 ABLATIONS_TEXT = """`without-X` leaves a block of inputs out, of the command's and of the kick's part; `with-X`
 adds one to the command's part; the others change what their settings say. Changes are to `plain`, which has the other
-players of a kick as lists of the nearest, on the shorter schedule: positive nats are worse, of the command's
-cross-entropy and of the log loss of parameters alike."""
+players of a kick as lists of the nearest and is trained by Adam on samples as they are, on the shorter schedule:
+positive nats are worse, of the command's cross-entropy and of the log loss of parameters alike."""
 TRAINING_TEXT = """How the preset is trained, beside `best-0`, each in its full length: `adam` moves all weights by
 Adam, as the paper does; `without-mirror` sees the training matches only as they were played."""
 REMEDIES_TEXT = """What is said to help with rare commands, beside `plain` on the same shorter schedule. The
@@ -338,7 +338,7 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
 Where kicks go, and how hard, by what the layers of a kick know of the other players and by how often they see one.
 `short` is the preset `best` on the shorter schedule; in `without-attention` they know only the two nearest of each side
 to the ball, in `lists` the ten team mates, the six nearest opponents and the three nearest the ball, in a fixed order.
-`plain` is `lists` without kicks beside the batches.
+`plain` is `lists` without kicks beside the batches, by Adam, on samples as they are.
 
 {table(headers, rows)}"""
 

@@ -237,8 +237,19 @@ class ParquetStore:
                     self._renew_database()
 
     def _tidy(self) -> None:
-        """Throw away what a killed writer left."""
-        shutil.rmtree(self._unfinished, ignore_errors=True)
+        """Throw away what a killed writer left.
+
+        Under another name first: a worker that lives on though its connection is lost must not find its folder half
+        emptied and put that among the matches.
+        """
+        for left in self._unfinished.glob("*"):
+            grave = self._unfinished / uuid.uuid4().hex
+            with suppress(OSError):
+                left.rename(grave)
+            if grave.is_dir():
+                shutil.rmtree(grave, ignore_errors=True)
+            else:
+                grave.unlink(missing_ok=True)
         with _writing(self.root):
             self._unfinished.mkdir(exist_ok=True)
 

@@ -16,7 +16,7 @@ import pytest
 
 from teamclone.errors import StoreError
 from teamclone.logs import Match
-from teamclone.store import create_store, is_store, open_store, schema
+from teamclone.store import create_store, is_store, open_store, parquet, schema
 
 
 @pytest.fixture
@@ -136,6 +136,35 @@ def test_leftovers_of_a_killed_ingest_go(filled: Path) -> None:
     assert store.sql("select count(*) from frames").num_rows == 1
     with store.writing():
         assert not left.exists()
+
+
+def test_a_writer_cut_off_puts_all_of_its_match_there_or_nothing(
+    tmp_path: Path, match: Match, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its ingest ended, and another is throwing away what it takes for left over, when the last file is written."""
+    store = create_store(tmp_path / "store")
+    write = parquet._write_match
+
+    def write_as_another_tidies(folder: Path, *arguments: Any, **options: Any) -> None:
+        write(folder, *arguments, **options)
+        with monkeypatch.context() as halfway:
+            halfway.setattr(parquet.shutil, "rmtree", emptied)
+            store._tidy()
+
+    def emptied(folder: Path, **_: object) -> None:
+        for file in [*folder.rglob("*.*")]:
+            if file.is_file():
+                file.unlink()
+
+    monkeypatch.setattr(parquet, "_write_match", write_as_another_tidies)
+    with pytest.raises(StoreError):
+        store.add(match)
+    assert store.match_ids() == []
+    monkeypatch.undo()
+    with store.writing():
+        store.add(match)
+    assert store.match_ids() == [match.match_id]
+    assert list((tmp_path / "store" / "unfinished").iterdir()) == []
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])

@@ -171,16 +171,16 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
         return () if quick else (f"train.epochs={max(1, round(count * scale))}",)
 
     usual = load_config("best").train.epochs
+    full = (*tiny, *(epochs(usual) if scale != 1 else ()))
     made = [
         Experiment(
             name=f"best-{seed}",
             step="c",
             preset="best",
-            overrides=(*tiny, *(epochs(usual) if scale != 1 else ()), f"train.seed={seed}"),
+            overrides=(*full, f"train.seed={seed}"),
         )
         for seed in SEEDS
     ]
-    full = (*tiny, *(epochs(usual) if scale != 1 else ()))
     made += [
         Experiment(name=name, step="t", preset="best", overrides=(*full, *changes))
         for name, changes in TRAINING.items()

@@ -21,15 +21,13 @@ class Orthogonal(torch.optim.Optimizer):
 
     So it goes as far in directions that few samples pull as in those that all do. Steps are scaled to the size of
     Adam's (Liu et al. 2025, "Muon is scalable for LLM training"), so that one learning rate serves both. PyTorch's own
-    always computes in bfloat16, which takes a processor without it eighty times as long.
+    always computes in bfloat16, which is far slower on a processor without it.
 
     Args:
         dtype: to compute in.
     """
 
-    def __init__(
-        self, matrices: list[nn.Parameter], *, lr: float, weight_decay: float, dtype: torch.dtype = torch.float32
-    ) -> None:
+    def __init__(self, matrices: list[nn.Parameter], *, lr: float, weight_decay: float, dtype: torch.dtype) -> None:
         self.dtype = dtype
         super().__init__(matrices, {"lr": lr, "weight_decay": weight_decay})
 
@@ -48,7 +46,7 @@ class Orthogonal(torch.optim.Optimizer):
                 weights.add_(step, alpha=-group["lr"] * ADAM_STEP * max(weights.shape) ** 0.5)
 
 
-def orthogonal(matrix: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+def orthogonal(matrix: Tensor, dtype: torch.dtype) -> Tensor:
     """About U V' of the singular value decomposition U S V' of a matrix, by five steps of Newton and Schulz."""
     wide = matrix.shape[0] <= matrix.shape[1]
     of = matrix if wide else matrix.T
@@ -64,7 +62,7 @@ def orthogonal(matrix: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
 class Muon:
     """`Orthogonal` for the matrices of the hidden layers, Adam for all other weights."""
 
-    def __init__(self, config: TrainConfig, model: nn.Module, *, dtype: torch.dtype = torch.float32) -> None:
+    def __init__(self, config: TrainConfig, model: nn.Module, *, dtype: torch.dtype) -> None:
         hidden: list[nn.Parameter] = []
         others: list[nn.Parameter] = []
         for name, weights in model.named_parameters():

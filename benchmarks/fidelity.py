@@ -129,6 +129,11 @@ class Experiment:
     overrides: tuple[str, ...]
     matches: int | None = None
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides its result, beside the dataset."""
+        return {"config": to_table(load_config(self.preset, self.overrides)), "matches": self.matches}
+
 
 def without(blocks: Sequence[str], *names: str) -> str:
     return ",".join(block for block in blocks if block not in names)
@@ -306,9 +311,13 @@ class Work:
         kept = {key: section[key] for key in ("rows", "model", "commands", "parameters", "confusion")}
         return {**kept, "matches": len(section["matches"])}
 
+    def folder_of(self, count: int | None) -> Path:
+        """Of the dataset with so many training matches; None for all."""
+        return self.out / ("dataset" if count is None else f"dataset-{count}")
+
     def subset(self, count: int) -> Path:
         """A dataset whose training matches are the first so many, with the same validation matches."""
-        folder = self.out / f"dataset-{count}"
+        folder = self.folder_of(count)
         if folder.is_dir():
             return folder
         data, kept = self.dataset, self.training_matches[:count]
@@ -330,14 +339,8 @@ class Work:
             SystemExit: it is there, of other settings.
         """
         path = self.out / "results" / f"{name}.json"
-        head = {"format": FORMAT, "name": name, "settings": {**settings, "dataset": self.dataset.id}}
         if path.is_file():
-            found = json.loads(path.read_text(encoding="utf-8"))
-            if found.get("format") != FORMAT or _whole(found.get("settings", {})) != _whole(head["settings"]):
-                sys.exit(
-                    f"{path}: made with other settings ({found.get('settings')}, now {head['settings']}); "
-                    "remove it, or choose another --out"
-                )
+            self.check(name, settings)
             print(f"{name}: done before", file=sys.stderr)
             return
         print(f"{name} ...", file=sys.stderr, flush=True)
@@ -349,7 +352,25 @@ class Work:
             "numpy": np.__version__,
             "teamclone": teamclone.__version__,
         }
+        head = {"format": FORMAT, "name": name, "settings": self.all_of(settings)}
         write_json(path, {**head, **make(), "machine": machine})
+
+    def all_of(self, settings: dict[str, Any]) -> dict[str, Any]:
+        return {**settings, "dataset": self.dataset.id}
+
+    def check(self, name: str, settings: dict[str, Any]) -> None:
+        """Whether a result that is there was made with these settings.
+
+        Raises:
+            SystemExit: with others.
+        """
+        path = self.out / "results" / f"{name}.json"
+        found, wanted = json.loads(path.read_text(encoding="utf-8")), self.all_of(settings)
+        if found.get("format") != FORMAT or _whole(found.get("settings", {})) != _whole(wanted):
+            sys.exit(
+                f"{path}: made with other settings ({found.get('settings')}, now {wanted}); "
+                "remove it, or choose another --out"
+            )
 
     def load(self) -> dict[str, dict[str, Any]]:
         """All results by name."""
@@ -363,11 +384,10 @@ class Work:
 
     def train(self, experiment: Experiment) -> dict[str, Any]:
         """Train, answer and measure."""
-        folder = self.out / "runs" / experiment.name
-        data = self.out / "dataset" if experiment.matches is None else self.subset(experiment.matches)
+        folder, data = self.out / "runs" / experiment.name, self.folder_of(experiment.matches)
+        if experiment.matches is not None:
+            self.subset(experiment.matches)
         config = load_config(experiment.preset, experiment.overrides)
-        sets = [part for setting in experiment.overrides for part in ("--set", setting)]
-        command = self.teamclone("train", data, "--preset", experiment.preset, *sets, "--out", folder)
         ended = self.out / "runs" / f"{experiment.name}.json"
         if not ended.is_file() or not _is_of(folder, config, data):
             ended.unlink(missing_ok=True)
@@ -379,7 +399,7 @@ class Work:
                 before = sum(record["seconds"] for record in open_run(folder).history())
                 cost = cost_of(*self.teamclone("train", data, "--out", folder, "--resume"))
             else:
-                cost = cost_of(*command)
+                cost = cost_of(*self.training(experiment))
             write_json(ended, {"seconds": before + cost.wall, "peak_bytes": cost.peak})
         run = open_run(folder)
         model = run.load_model()
@@ -390,13 +410,19 @@ class Work:
         best = {row.checkpoint: row.epoch for row in run.best()}
         return {
             **json.loads(ended.read_text(encoding="utf-8")),
-            "command": self.told(command),
             "epochs": len(run.history()),
             "best_epoch": best.get("best-loss"),
             "weights": parameter_count(model),
             "training_matches": experiment.matches or len(self.training_matches),
             "sets": self.figures(outcome),
         }
+
+    def training(self, experiment: Experiment) -> list[str]:
+        """The command of an experiment."""
+        sets = [part for setting in experiment.overrides for part in ("--set", setting)]
+        folder = self.out / "runs" / experiment.name
+        data = self.folder_of(experiment.matches)
+        return self.teamclone("train", data, "--preset", experiment.preset, *sets, "--out", folder)
 
     def told(self, command: Sequence[str]) -> str:
         """A command as a person types it, on MATCHES and with results in DIR."""
@@ -658,9 +684,7 @@ def main() -> None:
     for part in wanted:
         for experiment in trainings:
             if part in (*experiment.step, experiment.name):
-                config = to_table(load_config(experiment.preset, experiment.overrides))
-                settings = {"config": config, "matches": experiment.matches}
-                work.result(experiment.name, settings, lambda experiment=experiment: work.train(experiment))
+                work.result(experiment.name, experiment.settings, lambda experiment=experiment: work.train(experiment))
         for rule in baselines.NAMES:
             if part in ("a", rule):
                 work.result(rule, {}, lambda rule=rule: work.rule(rule))
@@ -670,13 +694,17 @@ def main() -> None:
             write_json(work.out / "left.json", work.what_is_left(work.load()))
     left = work.out / "left.json"
     page = options.page or work.out / "fidelity.md"
+    results = work.load()
+    there = [experiment for experiment in trainings if experiment.name in results]
+    for experiment in there:
+        work.check(experiment.name, experiment.settings)
     fidelity_page.write(
         page,
-        results=work.load(),
+        results=results,
         left=json.loads(left.read_text(encoding="utf-8")) if left.is_file() else {},
         variants={"t": TRAINING, "k": KICKS, "d": ablations(), "e": REMEDIES},
         cleaning=work.dataset.meta["cleaning"],
-        commands=[work.told(command) for command in work.commands],
+        commands=[work.told(command) for command in (*work.commands, *map(work.training, there))],
         situations=SITUATIONS,
         sure=SURE,
     )

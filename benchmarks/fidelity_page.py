@@ -82,7 +82,7 @@ def write(
 
     Args:
         results: by name. left: of step g. variants: settings of steps t, k, d and e by name.
-        cleaning: the dataset's report; None where nothing was run. commands: that made store and dataset.
+        cleaning: the dataset's report; None where nothing was run. commands: that made store, dataset and runs.
     """
     parts = [_head(results)]
     if results and cleaning is not None:
@@ -498,9 +498,8 @@ Where the errors are. The ball is taken to roll on freely to tell who has it fir
 
 def _reproduce(results: Results, commands: Sequence[str]) -> str:
     text = "## Reproduce\n\n```sh\nmake fidelity MATCHES=folder\n```"
-    lines = [*commands, *(result["command"] for result in results.values() if "command" in result)]
-    if lines:
-        listing = "\n".join(lines)
+    if commands:
+        listing = "\n".join(commands)
         text += f"\n\nwhich is, beside the measuring, with the logs in `MATCHES`:\n\n```\n{listing}\n```"
     machines = {
         f"{machine['processor']}, {machine['threads']} threads; teamclone {machine['teamclone']}, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -501,14 +501,19 @@ def _reproduce(results: Results, commands: Sequence[str]) -> str:
     if commands:
         listing = "\n".join(commands)
         text += f"\n\nwhich is, beside the measuring, with the logs in `MATCHES`:\n\n```\n{listing}\n```"
-    machines = {
+    if results:
+        text += "\n\n" + machines(result["machine"] for result in results.values())
+    return text
+
+
+def machines(found: Iterable[Mapping[str, Any]]) -> str:
+    """A sentence on where results were made, and with which versions."""
+    told = {
         f"{machine['processor']}, {machine['threads']} threads; teamclone {machine['teamclone']}, "
         f"PyTorch {machine['torch']}, NumPy {machine['numpy']}, Python {machine['python']}"
-        for machine in (result["machine"] for result in results.values())
+        for machine in found
     }
-    if machines:
-        text += "\n\nMachine and versions: " + "; and ".join(sorted(machines)) + "."
-    return text
+    return f"Machine and versions: {'; and '.join(sorted(told))}."
 
 
 def plot(curve: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fidelity import TEST_MATCHES
-from fidelity_page import filled, table
+from fidelity_page import filled, machines, table
 from measure import cost_of
 
 from teamclone.files import write_atomic, write_json
@@ -76,6 +76,7 @@ class Work:
             "seconds": json.loads(ended.read_text(encoding="utf-8"))["seconds"],
             "training_matches": sum(match["split"] == "train" for match in matches),
             "samples": open_run(run).history()[-1]["samples"],
+            "machine": open_run(run).environment,
             "test": figures,
         }
 
@@ -147,6 +148,7 @@ same form that goes through as many batches; both are tested on {len(adapted["ma
         table(("training matches", "samples", "adapted, s", *OF_TWO, "fresh, s", *OF_TWO), rows),
         "## Reproduce",
         "```\n" + "\n".join(work.commands) + "\n```",
+        machines(clone["machine"] for clone in clones.values()),
     ]
     return "\n\n".join(filled(part) for part in parts)
 

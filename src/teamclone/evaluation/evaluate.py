@@ -23,7 +23,7 @@ from teamclone.evaluation import bootstrap, metrics
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
 from teamclone.files import write_json
-from teamclone.models.heads import PointHead
+from teamclone.models.heads import PointHead, with_ball
 from teamclone.models.network import model_id, parameter_count
 from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED, parameters_of
@@ -61,6 +61,8 @@ def predict(
 ) -> Outcome:
     """A model's answers for some samples of a dataset, beside what happened.
 
+    Parameters of kicks and tackles are those of the samples in which one was given; nobody measures the others.
+
     Args:
         model: a clone; it is put into evaluation mode.
         dataset: where the samples lie.
@@ -77,13 +79,14 @@ def predict(
         for start in range(0, n, batch):
             part = rows[start : start + batch]
             stop = start + len(part)
+            target = Target(*(tensor.to(device) for tensor in dataset.target(part)))
+            kicks = with_ball(target)
             if inputs is None:
-                output = model.output(dataset.state(part, history=model.inputs.history).to(device))
+                output = model.output(dataset.state(part, history=model.inputs.history).to(device), kicks=kicks)
             else:
-                output = model.answer(model.inputs.normalise(inputs[start:stop].to(device)))
+                output = model.answer(model.inputs.normalise(inputs[start:stop].to(device)), kicks=kicks)
             answer = model.head.point(output)
             if model.config.head == "mixture" and not isinstance(model.head, PointHead):
-                target = Target(*(tensor.to(device) for tensor in dataset.target(part)))
                 likelihood = model.head.log_likelihood(output, target)
                 outcome.parameter_log_loss[start:stop] = -likelihood.float().cpu().numpy()
             kind, issued, last = truth(dataset, part)

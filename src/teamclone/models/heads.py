@@ -36,6 +36,8 @@ MOVE_PLACES = tuple((x, y) for x in (-45.0, -30.0, -15.0, -5.0) for y in (-12.0,
 """Where the components of a move begin to learn, metres: places of the own half."""
 MOVE_REACH_M = 10.0
 """How far from there one goes for an output of 1."""
+WITH_BALL = CLONED.index("kick"), CLONED.index("tackle")
+"""Classes whose parameters the layers of a kick find."""
 AIM_SCALE_DEG = 4.0
 """Scale of the bell by which a turn teaches the aims that are near its direction."""
 
@@ -194,8 +196,8 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are, target_width: of what is known of each target. aims: places of `aims.Aims`. commands: what it
-            answers with.
+            kicks are, target_width: of what is known of each target. kick_options: see `kicks.Kicks`. aims: places of
+            `aims.Aims`. commands: what it answers with.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.
@@ -211,6 +213,7 @@ class MixtureHead(nn.Module):
         parameter_width: int,
         kick_width: int,
         target_width: int,
+        kick_options: bool,
         aims: int,
         commands: tuple[str, ...] = CLONED,
     ) -> None:
@@ -219,7 +222,7 @@ class MixtureHead(nn.Module):
         self.command = nn.Linear(width, len(commands))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
-        self.kick = Kicks(kick_width, target_width)
+        self.kick = Kicks(kick_width, target_width, options=kick_options)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))
@@ -339,12 +342,12 @@ class MixtureHead(nn.Module):
         """
         turn = mixture.middle(output.turn.logits, output.turn.centre, angle=True) / DEGREE * output.turn_factor
         kick = _mean_kick(output.kick)
-        with_ball = [
+        on_ball = [
             mixture.middle(kick.power.logits, kick.power.centre.clamp(0, 100), angle=False),
             mixture.middle(kick.direction.logits, kick.direction.centre, angle=True) / DEGREE,
             direction_of(kick.tackle),
         ]
-        kick_power, kick_direction, tackle = (_spread(values, output) for values in with_ball)
+        kick_power, kick_direction, tackle = (_spread(values, output) for values in on_ball)
         parameters = [
             mixture.middle(output.dash_power.logits, output.dash_power.centre.clamp(0, 100), angle=False),
             direction_of(output.dash_direction),
@@ -398,6 +401,12 @@ class MixtureHead(nn.Module):
     def log_likelihood(output: Distribution, target: Target) -> Tensor:
         """(batch,) log-likelihood of the parameters of the command given, per unit of power and degree."""
         return _chosen(output, target, _kick_likelihood(_mean_kick(output.kick), output, target))
+
+
+def with_ball(target: Target) -> Tensor:
+    """(n,) where a kick or tackle was given."""
+    kick, tackle = WITH_BALL
+    return torch.nonzero((target.kind == kick) | (target.kind == tackle)).squeeze(1)
 
 
 def _mean_kick(kicks: Sequence[Kick]) -> Kick:

@@ -10,8 +10,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from teamclone.models import mixture
 from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
+from teamclone.models.options import Options
 from teamclone.models.physics import covered
 from teamclone.models.relative import MATES, geometry_of, mates_of
 from teamclone.rcss import pitch
@@ -35,15 +37,17 @@ class Kicks(nn.Module):
     Args:
         width: of what a kick is decided on.
         target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
+        options: add those of `options.Options`.
     """
 
     goal: Tensor
     cycles: Tensor
 
-    def __init__(self, width: int, target_width: int = 0) -> None:
+    def __init__(self, width: int, target_width: int = 0, *, options: bool = False) -> None:
         super().__init__()
         self.layer = nn.Linear(width, 6 * COUNT)
         self.target = nn.Linear(target_width, 6) if target_width else None
+        self.options = Options(width) if options else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
@@ -54,6 +58,14 @@ class Kicks(nn.Module):
             hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
             targets: (batch, TARGETS, target width), None for nothing.
         """
+        free = self._free(hidden, geometry, targets)
+        if self.options is None:
+            return free
+        power, angle = (mixture.side_by_side(pair) for pair in zip(free, self.options(hidden, geometry), strict=True))
+        return power, angle
+
+    def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:
+        """Those that the network moves about."""
         raw = self.layer(hidden).float().view(-1, 6, COUNT)
         if self.target is not None and targets is not None:
             # The components begin with the team mates and the goal.

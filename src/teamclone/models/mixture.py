@@ -24,6 +24,10 @@ CLIPPED = 1e-2
 """An argument so close to its bound, in its unit, was clipped to it."""
 
 
+MOST = 128
+"""Components among which a median is looked for: those with the greatest shares."""
+
+
 class Mixture(NamedTuple):
     """Components of one parameter, (batch, components) each: logits of their shares, centres, scales."""
 
@@ -117,10 +121,15 @@ def mirrored(angles: Mixture) -> Mixture:
     return angles._replace(centre=-angles.centre)
 
 
+def side_by_side(parts: Sequence[Mixture]) -> Mixture:
+    """One mixture of the components of several, whose shares are known beside one another."""
+    return Mixture(*(torch.cat(columns, 1) for columns in zip(*parts, strict=True)))
+
+
 def merged(parts: Sequence[Mixture]) -> Mixture:
     """One mixture of the components of several, each with its share divided by their number."""
     shares = [part._replace(logits=torch.log_softmax(part.logits, 1)) for part in parts]
-    return Mixture(*(torch.cat(columns, 1) for columns in zip(*shares, strict=True)))
+    return side_by_side(shares)
 
 
 def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
@@ -128,6 +137,9 @@ def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
 
     A mean would lie between left and right, where nobody kicks.
     """
+    if centre.shape[1] > MOST:
+        chosen = logits.topk(MOST, dim=1).indices
+        logits, centre = logits.gather(1, chosen), centre.gather(1, chosen)
     distance = centre[:, :, None] - centre[:, None, :]
     if angle:
         distance = wrap(distance)

@@ -113,16 +113,16 @@ class Clone(nn.Module):
     def inputs(self) -> Features:
         return cast(Features, self.features)
 
-    def output(self, state: State) -> Any:
-        """What the head answers, for ``head.loss`` and ``head.point``."""
-        return self.answer(self.features(state))
+    def output(self, state: State, *, kicks: Tensor | None = None) -> Any:
+        """What the head answers, for ``head.loss`` and ``head.point``; ``kicks`` as of `answer`."""
+        return self.answer(self.features(state), kicks=kicks)
 
     def answer(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Any:
         """The same from what the features make of a state, (batch, columns).
 
         Args:
-            kicks: (n,) places of the situations of which to answer on kicks and tackles, too; None for all. Training,
-                which knows where one was given, saves half its time by it. The paper's network answers all at once.
+            kicks: (n,) places of the situations of which to answer on kicks and tackles, too; None for all. Who knows
+                where one was given saves most of the time by it. The paper's network answers all at once.
         """
         if kicks is None or self.config.head == "point":
             return self.head(self.trunk(inputs))
@@ -154,6 +154,7 @@ def _head(config: ModelConfig) -> PointHead | MixtureHead:
             parameter_width=config.parameter_hidden[-1],
             kick_width=config.kick_hidden[-1] + config.kick_attention,
             target_width=config.kick_attention,
+            kick_options=config.kick_options,
             aims=config.aims,
             commands=config.commands,
         )

@@ -49,6 +49,7 @@ NEAR_SHARE = 0.1
 GEOMETRY = (
     "x", "y", "coast_x", "coast_y", "cos", "sin", "forward", "aside", "turn_factor", "decay", "dash_gain", "income",
     "line_x", "near_m", "ball_x", "ball_y", "ball_vx", "ball_vy", "kick_gain", "turn_to_ball", "turn_to_meet",
+    "kick_area", "kick_margin",
     *(f"mate_{mate}_{axis}" for mate in range(MATES) for axis in "xy"),
 )  # fmt: skip
 """What makes a command of a place on the pitch or of a wanted motion; metres, metres per cycle, radians:
@@ -59,6 +60,7 @@ dash_gain: speed that one unit of dash power gives. income: stamina that one cyc
 line_x: the offside line, or where a team mate meets the ball if that is further. near_m: see NEAR_SHARE.
 ball_x, ball_y, ball_vx, ball_vy: the ball. kick_gain: speed that one unit of kick power gives it.
 turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from where he rolls out to where he meets it.
+kick_area: see `kickable_area`; kick_margin: the part of it beyond the edges of player and ball.
 mate_0_x, ...: the team mates, the nearest first; where one is missing, the actor.
 """
 _SIDED = Situation.KICK_OFF
@@ -313,6 +315,8 @@ class RelativeFeatures(nn.Module):
                         kick_rate(ball[:, :2] - view.origin, body, my_type),
                         view.angle(next_ball - view.origin - _of(motion, actor)),
                         view.angle(meetings[0] - at_meeting),
+                        _of(areas, actor),
+                        my_type[:, TYPE_FIELD["kickable_margin"]],
                     ],
                     1,
                 ),

@@ -22,10 +22,9 @@ from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.files import write_atomic
+from teamclone.models.heads import WITH_BALL, with_ball
 from teamclone.models.loss import Balance, ParameterLoss
 from teamclone.models.network import Clone
-from teamclone.models.state import Target
-from teamclone.rcss.commands import CLONED
 from teamclone.training.calibration import Calibration
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
@@ -41,8 +40,6 @@ WARM_UP = 200
 """Batches over which the cosine schedule rises."""
 GATHER_ROWS = 16384
 """Rows gathered at once where the batch size does not matter; bounds memory."""
-WITH_BALL = CLONED.index("kick"), CLONED.index("tackle")
-"""Classes whose parameters the layers of a kick find."""
 ONEDNN_ACTIVATIONS = ("relu", "gelu")
 """Those that PyTorch can take through oneDNN in single precision, forth and back."""
 
@@ -228,12 +225,6 @@ def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], 
         hidden: Tensor = model.trunk(inputs.to_mkldnn()).to_dense()
         return model.head(hidden)
     return model.answer(inputs, kicks=kicks)
-
-
-def with_ball(target: Target) -> Tensor:
-    """(n,) where a kick or tackle was given."""
-    kick, tackle = WITH_BALL
-    return torch.nonzero((target.kind == kick) | (target.kind == tackle)).squeeze(1)
 
 
 def _kick_order(config: TrainConfig, rows: NDArray[np.int64], *, epoch: int, batches: int) -> NDArray[np.int64]:

@@ -148,10 +148,11 @@ MODEL = ModelConfig(
 )
 
 
-@pytest.fixture(scope="module", params=[0, 8], ids=["plain", "attention"])
+@pytest.fixture(scope="module", params=["plain", "attention", "options"])
 def model(request: pytest.FixtureRequest) -> Clone:
     torch.manual_seed(0)
-    model = Clone(replace(MODEL, kick_attention=request.param))
+    attention = 0 if request.param == "plain" else 8
+    model = Clone(replace(MODEL, kick_attention=attention, kick_options=request.param == "options"))
     # Of samples that lean to one side.
     state = situations(100, seed=5)
     model.inputs.fit([model.inputs.project(State(*(tensor[state.ball[:, 1] > 0] for tensor in state)))])

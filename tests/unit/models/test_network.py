@@ -9,13 +9,13 @@ from tests.situations import situations
 from torch import Tensor
 
 from teamclone.models.config import ACTIVATIONS, BLOCKS, ModelConfig
+from teamclone.models.heads import with_ball
 from teamclone.models.loss import Balance
 from teamclone.models.network import Clone, parameter_count
 from teamclone.models.state import CHANNEL, State, Target
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 from teamclone.rcss.player_types import FIELDS
 from teamclone.training.config import load_config
-from teamclone.training.loop import with_ball
 
 
 @pytest.fixture(autouse=True)
@@ -112,6 +112,7 @@ MODELS = {
     "point": replace(SMALL, head="point", kick_blocks=(), kick_hidden=(), parameter_hidden=()),
     "past": replace(SMALL, blocks=("self", "past")),
     "attention": replace(SMALL, kick_attention=8),
+    "options": replace(SMALL, kick_attention=8, kick_options=True),
     "all": replace(SMALL, blocks=BLOCKS, kick_blocks=BLOCKS, kick_attention=4, dropout=0.2, kick_dropout=0.2),
 }
 

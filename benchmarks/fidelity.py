@@ -7,7 +7,7 @@ MATCHES is a folder of logs. Steps, in the order in which --only names them:
     c  preset best, three seeds          f  learning curve over 1, 2, 5, 10 and all training matches
     b  preset paper, eight minutes       d  preset best without each of its parts, on a shorter schedule
     a  rules, gradient-boosted trees     e  remedies for rare commands, on the same shorter schedule
-    k  how kicks come to know others     g  what is left: from the results of c and f
+    k  what the layers of a kick know    g  what is left: from the results of c and f
     t  preset best, otherwise trained
 
 --only also takes single results by name. Each result is a file DIR/results/NAME.json; what is there is not done again,
@@ -73,6 +73,7 @@ SURE = 0.8
 PLAIN = (
     "model.kick_blocks=self,type,last,ball,reach,lines,mates,opponents,rivals",
     "model.kick_attention=0",
+    "model.kick_options=false",
     "train.kicks=0",
     "train.optimiser=adam",
     "data.mirror=0.0",
@@ -86,11 +87,12 @@ TRAINING: dict[str, tuple[str, ...]] = {
 """How the preset is trained: name and settings beside its own, in its full length; what keeps a network from learning
 its matches by heart pays in the last epochs only."""
 KICKS: dict[str, tuple[str, ...]] = {
-    "without-attention": ("model.kick_attention=0",),
-    "lists": PLAIN[:2],
+    "without-options": ("model.kick_options=false",),
+    "without-attention": PLAIN[1:3],
+    "lists": PLAIN[:3],
     "without-kicks": ("train.kicks=0",),
 }
-"""How kicks may know of the other players, and how often they are shown: name and settings beside the preset's."""
+"""What kicks may know of the other players and of what there is to choose from, and how often they are shown: name and settings beside the preset's."""
 REMEDIES: dict[str, tuple[str, ...]] = {
     "oversample": ("train.balance=oversample", "train.balance_strength=0.5"),
     "undersample": ("train.balance=undersample", "train.balance_strength=0.5"),

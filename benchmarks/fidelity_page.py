@@ -335,9 +335,10 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
     )
     return f"""## Kicks
 
-Where kicks go, and how hard, by what the layers of a kick know of the other players and by how often they see one.
-`short` is the preset `best` on the shorter schedule; in `without-attention` they know only the two nearest of each side
-to the ball, in `lists` the ten team mates, the six nearest opponents and the three nearest the ball, in a fixed order.
+Where kicks go, and how hard, by what the layers of a kick know and by how often they see one. `short` is the preset
+`best` on the shorter schedule; `without-options` knows nothing of what agents choose between, nor do the others. In
+`without-attention` they know only the two nearest of each side to the ball, in `lists` the ten team mates, the six
+nearest opponents and the three nearest the ball, in a fixed order.
 `plain` is `lists` without kicks beside the batches, by Adam, on samples as they are.
 
 {table(headers, rows)}"""

@@ -37,7 +37,7 @@ class Kicks(nn.Module):
     Args:
         width: of what a kick is decided on.
         target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
-        options: add those of `options.Options`.
+        options: add those of `options.Options`, which need a target width.
     """
 
     goal: Tensor
@@ -47,7 +47,7 @@ class Kicks(nn.Module):
         super().__init__()
         self.layer = nn.Linear(width, 6 * COUNT)
         self.target = nn.Linear(target_width, 6) if target_width else None
-        self.options = Options(width) if options else None
+        self.options = Options(width, target_width) if options else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
@@ -59,9 +59,11 @@ class Kicks(nn.Module):
             targets: (batch, TARGETS, target width), None for nothing.
         """
         free = self._free(hidden, geometry, targets)
-        if self.options is None:
+        if self.options is None or targets is None:
             return free
-        power, angle = (mixture.side_by_side(pair) for pair in zip(free, self.options(hidden, geometry), strict=True))
+        power, angle = (
+            mixture.side_by_side(pair) for pair in zip(free, self.options(hidden, geometry, targets), strict=True)
+        )
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:

@@ -22,6 +22,7 @@ from teamclone.rcss import pitch
 
 KICK_ON = ((0.3, 12), (0.5, 15), (0.7, 20))
 """Places from which to kick it on: parts of the kickable margin, and how many around the body."""
+N_KICK_ON = sum(count for _, count in KICK_ON)
 KEEP = ((0.4, 20), (0.6, 20), (0.75, 20))
 """Places where to keep it, around the player in the axes of the pitch."""
 KEPT_OFF_M = 0.1, 0.2
@@ -36,8 +37,8 @@ RUN_STEP_DEG, RUN_SIDE, RUN_DASHES = 6.0, 8, tuple(range(5, 21))
 """Directions of a run behind the ball: their distance, how many to each side; at most one turn; its dashes."""
 KINDS = 4
 """Kick on, keep, dribble, run."""
-COLUMNS = 26
-"""Inputs of each: `Options.columns`."""
+COLUMNS, ASIDE = 26, (10, 12)
+"""Inputs of each: `Options.columns`; and which of them change their sign where left and right are exchanged."""
 HIDDEN = 32
 OPPONENTS = 6
 """The nearest, who are looked at."""
@@ -82,7 +83,7 @@ class Options(nn.Module):
     """Components of power and direction of a kick, one for each option.
 
     Args:
-        width: of what a kick is decided on.
+        width: of what a kick is decided on. target_width: of what is known of each of `crowd.TARGETS`.
 
     Attributes:
         error: (KINDS,) logarithm of the velocities by which kicks miss what was wanted, in USUAL_ERROR.
@@ -93,13 +94,15 @@ class Options(nn.Module):
     divisions: Tensor
     dribbles: Tensor
     runs: Tensor
+    signs: Tensor
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, target_width: int) -> None:
         super().__init__()
         self.option = nn.Linear(COLUMNS, HIDDEN)
         self.situation = nn.Linear(width, HIDDEN)
         self.both = nn.Linear(HIDDEN, HIDDEN)
         self.share = nn.Linear(HIDDEN, 1)
+        self.toward = nn.Linear(target_width, HIDDEN + 1)
         self.error = nn.Parameter(torch.zeros(KINDS))
         rings = [ring for rings in (KICK_ON, KEEP) for ring in rings]
         counts = [sum(count for _, count in kind) for kind in (KICK_ON, KEEP)]
@@ -110,30 +113,43 @@ class Options(nn.Module):
             "divisions": torch.cat([torch.full((count,), part) for part, count in rings]),
             "dribbles": torch.arange(DRIBBLE_TURNS) * (360.0 / DRIBBLE_TURNS) - 180.0,
             "runs": torch.arange(-RUN_SIDE, RUN_SIDE + 1) * RUN_STEP_DEG,
+            "signs": torch.tensor([-1.0 if column in ASIDE else 1.0 for column in range(COLUMNS)]),
         }
         for name, constant in constants.items():
             self.register_buffer(name, constant, persistent=False)
 
-    def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
-        """Power and direction (radians from the body).
+    def forward(self, hidden: Tensor, geometry: Tensor, targets: Tensor) -> tuple[Mixture, Mixture]:
+        """Power and direction (radians from the body), of situations and then of their mirror images.
+
+        The options of the latter are those of the former, mirrored, and come in the same order.
 
         Args:
-            hidden: (batch, width). geometry: GEOMETRY and OTHER of all OTHERS, (batch, columns).
+            hidden: (2 * batch, width). geometry: GEOMETRY and OTHER of all OTHERS, (2 * batch, columns).
+            targets: (2 * batch, TARGETS, target width).
         """
+        geometry = geometry[: geometry.shape[0] // 2]
         with torch.autocast(geometry.device.type, enabled=False):
             choice = self.choose(geometry)
             columns = self.columns(choice, geometry)
+            columns = torch.cat([columns, columns * self.signs])
         seen = torch.relu(self.option(columns) + self.situation(hidden)[:, None])
-        share = self.share(torch.relu(self.both(seen)))[..., 0].float()
+        known = torch.relu(self.both(seen))
+        share = self.share(known)[..., 0].float()
+        # Who kicks it on has someone in mind to kick it to.
+        wish, key = self.toward(targets).split([1, HIDDEN], 2)
+        suits = (known[:, :N_KICK_ON] @ key.transpose(1, 2) + wish.transpose(1, 2)).float().logsumexp(2)
+        share = share + functional.pad(suits, (0, share.shape[1] - N_KICK_ON))
         with torch.autocast(geometry.device.type, enabled=False):
-            logits = torch.where(choice.possible, share + AT_FIRST, IMPOSSIBLE)
+            logits = torch.where(choice.possible.repeat(2, 1), share + AT_FIRST, IMPOSSIBLE)
             added = choice.velocity - _ball_velocity(geometry)[:, None]
             gain = geometry_of(geometry, "kick_gain")[0].clamp(min=5e-3)
             speed = torch.sqrt(added.square().sum(-1) + 1e-6)
             error = USUAL_ERROR * self.error.exp()[self.kinds]
+            power, power_scale = (speed / gain).clamp(max=150.0), LEAST_POWER + error / gain
+            angle, angle_scale = torch.atan2(added[..., 1], added[..., 0]), LEAST_ANGLE + error / speed
             return (
-                Mixture(logits, (speed / gain).clamp(max=150.0), LEAST_POWER + error / gain),
-                Mixture(logits, torch.atan2(added[..., 1], added[..., 0]), LEAST_ANGLE + error / speed),
+                Mixture(logits, power.repeat(2, 1), power_scale.repeat(2, 1)),
+                Mixture(logits, torch.cat([angle, -angle]), angle_scale.repeat(2, 1)),
             )
 
     def choose(self, geometry: Tensor) -> Choice:

@@ -10,7 +10,7 @@ import torch
 
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.dataset.reader import open_dataset
-from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER
+from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture
 from teamclone.models.options import (
     COLUMNS,
     DRIBBLE_DASHES,
@@ -44,6 +44,15 @@ def geometry(*, opponents: list[tuple[float, float]] | None = None, **values: fl
     return torch.cat([columns, others.flatten()])[None]
 
 
+def kicked(situations: torch.Tensor, options: Options | None = None) -> tuple[Mixture, Mixture]:
+    """Power and direction of the options, as they are and not mirrored."""
+    n = len(situations)
+    of = options or Options(3, 4)
+    power, direction = of(torch.zeros(2 * n, 3), situations.repeat(2, 1), torch.zeros(2 * n, MATES + 1, 4))
+    torch.testing.assert_close(direction.centre[n:], -direction.centre[:n])
+    return Mixture(*(part[:n] for part in power)), Mixture(*(part[:n] for part in direction))
+
+
 def played(option: int, *, turns: int, angle: float, dashes: int, **values: float) -> tuple[list[float], list[float]]:
     """Player and ball after the kick of an option, by the server's physics; ``angle`` of the dashes from the body."""
     situation = geometry(**values)
@@ -52,11 +61,11 @@ def played(option: int, *, turns: int, angle: float, dashes: int, **values: floa
         for value in torch.cat(geometry_of(situation, "x", "y", "aside", "forward", "ball_x", "ball_y"), 1)[0]
     )
     vx = -vx  # he faces +y: to his left is -x
-    power, direction = Options(3)(torch.zeros(1, 3), situation)
+    power, direction = kicked(situation)
     turned = float(direction.centre[0, option])
-    kicked = 0.025 * float(power.centre[0, option])
-    ball_vx = values.get("ball_vx", 0.0) - kicked * math.sin(turned)
-    ball_vy = values.get("ball_vy", 0.0) + kicked * math.cos(turned)
+    added = 0.025 * float(power.centre[0, option])
+    ball_vx = values.get("ball_vx", 0.0) - added * math.sin(turned)
+    ball_vy = values.get("ball_vy", 0.0) + added * math.cos(turned)
     for cycle in range(1 + turns + dashes):
         if cycle > turns:
             vx -= 0.6 * math.sin(math.radians(angle))
@@ -70,7 +79,7 @@ MOVING = {"forward": 0.3, "aside": 0.05, "ball_vx": 0.1, "ball_vy": 0.2}
 
 
 def test_how_many_there_are() -> None:
-    choice = Options(3).choose(geometry())
+    choice = Options(3, 4).choose(geometry())
     assert [sum(count for _, count in rings) for rings in (KICK_ON, KEEP)] == [47, 60]
     assert DRIBBLE_TURNS * len(DRIBBLE_DASHES) == 48
     count = FIRST["run"] + (2 * RUN_SIDE + 1) * len(RUN_DASHES)
@@ -122,7 +131,7 @@ def test_a_dribbler_turns_as_far_as_he_comes() -> None:
     fast = {"forward": 1.5, "turn_factor": factor}
     first = 180 / (1 + (factor - 1) * 0.4)
     assert first == pytest.approx(45)
-    choice = Options(3).choose(geometry(**fast))
+    choice = Options(3, 4).choose(geometry(**fast))
     dribbles = choice.possible[0, FIRST["dribble"] : FIRST["run"]].view(DRIBBLE_TURNS, 3).any(1)
     # 135 and more, either way, is beyond two turns of 126.8 deg.
     assert [round(22.5 * index - 180, 1) for index in range(16) if not dribbles[index]] == [-180.0, -157.5, 157.5]
@@ -144,12 +153,12 @@ def test_a_run_meets_the_ball(steps: int, dashes: int) -> None:
 
 
 def test_what_one_kick_cannot_do_is_impossible() -> None:
-    options = Options(3)
+    options = Options(3, 4)
     weak = options.choose(geometry(kick_gain=0.001, ball_vy=2.5)).possible
     assert not weak.any()
-    power, direction = options(torch.zeros(1, 3), geometry(kick_gain=0.001, ball_vy=2.5))
+    power, direction = kicked(geometry(kick_gain=0.001, ball_vy=2.5))
     assert (power.logits == IMPOSSIBLE).all()
-    assert power.logits is direction.logits
+    assert torch.equal(power.logits, direction.logits)
     # A run of 20 dashes goes further than the ball rolls at 3 m a cycle; a turn of 60 deg is too much for who is fast.
     choice = options.choose(geometry(turn_factor=9.0))
     runs = choice.possible[0, FIRST["run"] :].view(-1, len(RUN_DASHES)).any(1)
@@ -158,10 +167,10 @@ def test_what_one_kick_cannot_do_is_impossible() -> None:
 
 def test_errors_are_of_the_ball_velocity() -> None:
     """The harder a kick, the less a wrong velocity turns it."""
-    options = Options(3)
+    options = Options(3, 4)
     with torch.no_grad():
         options.error += math.log(2.0)
-        power, direction = options(torch.zeros(1, 3), geometry())
+        power, direction = kicked(geometry(), options)
     assert power.scale[0].tolist() == pytest.approx([LEAST_POWER + 2 * USUAL_ERROR / 0.025] * power.scale.shape[1])
     speed = 0.025 * power.centre[0]
     torch.testing.assert_close(direction.scale[0], LEAST_ANGLE + 2 * USUAL_ERROR / speed, atol=1e-5, rtol=1e-3)
@@ -169,7 +178,7 @@ def test_errors_are_of_the_ball_velocity() -> None:
 
 def test_what_is_known_of_a_place() -> None:
     """Of a ball kept 0.385 + 0.42 m straight ahead, with an opponent 1.5 m before it who looks the other way."""
-    options = Options(3)
+    options = Options(3, 4)
     keep = FIRST["keep"] + 20 + 15
     off = EDGES + 0.6 * MARGIN
     situation = geometry(opponents=[(10.0, -5 + off + 1.5), (30.0, 20.0)])
@@ -190,7 +199,7 @@ def test_what_is_known_of_a_place() -> None:
 
 def test_what_is_known_of_a_dribble() -> None:
     """Straight on with two dashes, to y = -3.04 in three cycles; one stands 4 m further and faces him, in his way."""
-    options = Options(3)
+    options = Options(3, 4)
     straight = FIRST["dribble"] + 3 * 8
     place = -5 + 0.6 + 0.84 + EDGES + 0.2 * MARGIN
     situation = geometry(opponents=[(10.0, place + 4)])
@@ -213,7 +222,7 @@ def test_what_is_known_of_a_dribble() -> None:
 
 def test_the_best_safe_place_is_told() -> None:
     """With nobody there all are safe: nothing is better than the best, which is as near to the goal as one may come."""
-    options = Options(3)
+    options = Options(3, 4)
     situation = geometry(cos=1, sin=0, y=0, ball_x=10.5, ball_y=0)
     choice = options.choose(situation)
     columns = options.columns(choice, situation)
@@ -238,10 +247,27 @@ def test_agents_of_real_matches_choose_among_them(samples_dir: Path, tmp_path: P
     assert len(rows) > 100
     features = RelativeFeatures(("ball",), others=True)
     columns = features.project(data.state(rows.numpy()))[:, features.n_inputs :]
-    options = Options(3)
-    power, direction = options(torch.zeros(len(rows), 3), columns)
+    power, direction = kicked(columns)
     gain = geometry_of(columns, "kick_gain")[0]
     given = torch.polar(gain[:, 0] * target.parameters[rows, 0], target.parameters[rows, 1] * DEGREE)
     missed = (torch.polar(gain * power.centre, direction.centre) - given[:, None]).abs()
     missed = torch.where(power.logits > IMPOSSIBLE, missed, 9.0).amin(1)
     assert (missed < 0.002).float().mean() > 0.5
+
+
+def test_what_is_known_is_mirrored() -> None:
+    """Options of a mirrored situation, each beside that of the situation which goes to the other side."""
+    options = Options(3, 4)
+    values = {"cos": 0.6, "sin": 0.8, "forward": 0.3, "aside": 0.1, "ball_vx": 0.2, "ball_vy": -0.1, "y": -3.0}
+    opposite = {name: -value if name in {"sin", "aside", "ball_vy", "y"} else value for name, value in values.items()}
+    one = geometry(**values, ball_y=-2.5, opponents=[(12.0, -1.0)])
+    other = geometry(**opposite, ball_y=2.5, opponents=[(12.0, 1.0)])
+    choice, turned = options.choose(one), options.choose(other)
+    away = torch.cdist(choice.velocity * torch.tensor([1.0, -1.0]), turned.velocity)[0]
+    same_kind = options.kinds[:, None] == options.kinds
+    nearest, partner = torch.where(same_kind, away, 9.0).min(1)
+    assert nearest.max() < 1e-3
+    columns, expected = options.columns(choice, one) * options.signs, options.columns(turned, other)[:, partner]
+    # As many cycles may lead to the same velocity.
+    torch.testing.assert_close(columns[..., :13], expected[..., :13], atol=1e-3, rtol=1e-3)
+    torch.testing.assert_close(columns[..., 14:17], expected[..., 14:17], atol=1e-3, rtol=1e-3)

@@ -35,26 +35,31 @@ FACED_DEG = 10.0
 """From which on a dribbler turns, and once more."""
 RUN_STEP_DEG, RUN_SIDE, RUN_DASHES = 6.0, 8, tuple(range(5, 21))
 """Directions of a run behind the ball: their distance, how many to each side; at most one turn; its dashes."""
+RUN_MOST = (20.0, 15), (10.0, 13), (0.0, 7), (-20.0, 6)
+"""Most dashes of a run where the ball's x is less; elsewhere all."""
 KINDS = 4
 """Kick on, keep, dribble, run."""
-COLUMNS, ASIDE = 26, (10, 12)
+_DRIBBLE = 2
+COLUMNS, ASIDE = 30, (10, 12)
 """Inputs of each: `Options.columns`; and which of them change their sign where left and right are exchanged."""
 HIDDEN = 32
 OPPONENTS = 6
 """The nearest, who are looked at."""
-FAR_M = 1000.0
-"""Where one who is missing is thought to be."""
+NEAR_M, FAR_M = 5.0, 1000.0
+"""From where on a place is out of his way; where one who is missing is thought to be."""
 REACH_M, DASH_AND_KICK_M = 1.285, 1.8
 """How near an opponent has to come to the ball; how near he can kick it after one more dash."""
 RUN_SPEED, OPPONENT_DECAY, COASTED = 1.0, 0.4, 1.6
 """Of an opponent of the default type: at full speed; and for how many cycles' way his velocity carries him."""
 RISE = OPPONENT_DECAY / (1 - OPPONENT_DECAY)
 """Cycles that he loses until he is at full speed."""
-FACED, TURN_CYCLES = math.cos(math.radians(15)), 2.0
-"""Who does not face the place has to turn first."""
-NEAR_GOAL_M = 40.0
-"""From where on a ball nearer to the goal is worth more."""
-SAFE = -1.5, -0.5
+FACED, TURN_CYCLES, WAY_M = math.cos(math.radians(15)), 2.0, 0.8
+"""Who does not face the place has to turn first; who is so far ahead of the ball is in its way."""
+BOLD_CYCLES, CARE_X_M = 1.5, (0.0, 30.0)
+"""By how much sooner a dribbler thinks that he has the ball, and behind which lines it is a cycle less."""
+NEAR_GOAL_M, GAIN_WORTH = 40.0, 10.0
+"""From where on a ball nearer to the goal is worth more; and what the power of the next kick is worth beside metres."""
+SAFE = -1.0, -0.5, 0.0
 """Cycles by which he is to have the ball first."""
 IMPOSSIBLE = -30.0
 """Logit of what cannot be done."""
@@ -70,13 +75,14 @@ class Choice(NamedTuple):
 
     Attributes:
         velocity: (batch, options, 2) of the ball after the kick. place: where he has it again, from where he is.
-        cycles: until then. possible: whether one kick does it.
+        cycles: until then. possible: whether one kick does it. usual: whether agents think of it there.
     """
 
     velocity: Tensor
     place: Tensor
     cycles: Tensor
     possible: Tensor
+    usual: Tensor
 
 
 class Options(nn.Module):
@@ -105,10 +111,10 @@ class Options(nn.Module):
         self.toward = nn.Linear(target_width, HIDDEN + 1)
         self.error = nn.Parameter(torch.zeros(KINDS))
         rings = [ring for rings in (KICK_ON, KEEP) for ring in rings]
-        counts = [sum(count for _, count in kind) for kind in (KICK_ON, KEEP)]
-        counts += [DRIBBLE_TURNS * len(DRIBBLE_DASHES), (2 * RUN_SIDE + 1) * len(RUN_DASHES)]
+        self.counts = [sum(count for _, count in kind) for kind in (KICK_ON, KEEP)]
+        self.counts += [DRIBBLE_TURNS * len(DRIBBLE_DASHES), (2 * RUN_SIDE + 1) * len(RUN_DASHES)]
         constants = {
-            "kinds": torch.arange(KINDS).repeat_interleave(torch.tensor(counts)),
+            "kinds": torch.arange(KINDS).repeat_interleave(torch.tensor(self.counts)),
             "places": torch.cat([torch.arange(count) * (2 * math.pi / count) - math.pi for _, count in rings]),
             "divisions": torch.cat([torch.full((count,), part) for part, count in rings]),
             "dribbles": torch.arange(DRIBBLE_TURNS) * (360.0 / DRIBBLE_TURNS) - 180.0,
@@ -155,11 +161,11 @@ class Options(nn.Module):
     def choose(self, geometry: Tensor) -> Choice:
         """What there is to choose from."""
         parts = [self._places(geometry), self._dribbles(geometry), self._runs(geometry)]
-        velocity, place, cycles, possible = (torch.cat(part, 1) for part in zip(*parts, strict=True))
+        velocity, place, cycles, possible, usual = (torch.cat(part, 1) for part in zip(*parts, strict=True))
         gain = geometry_of(geometry, "kick_gain")[0]
         power = (velocity - _ball_velocity(geometry)[:, None]).norm(dim=-1) / gain.clamp(min=5e-3)
         possible = possible & (power <= 100.5) & (velocity.norm(dim=-1) <= BALL_SPEED_MAX + 0.01)
-        return Choice(velocity, place, cycles, possible)
+        return Choice(velocity, place, cycles, possible, usual)
 
     def _places(self, geometry: Tensor) -> Choice:
         """The ball beside him in the next cycle, when he has rolled on."""
@@ -175,7 +181,7 @@ class Options(nn.Module):
         y = torch.where(to_kick_on, to_pitch[1], to_pitch[1] * cos - to_pitch[0] * sin)
         place = distance[..., None] * torch.stack([x, y], -1) + _motion(geometry)[:, None]
         one = torch.ones_like(x)
-        return Choice(place - _ball(geometry)[:, None], place, one, one > 0)
+        return Choice(place - _ball(geometry)[:, None], place, one, one > 0, one > 0)
 
     def _dribbles(self, geometry: Tensor) -> Choice:
         """The ball just ahead after as many turns as the direction needs, and a few dashes."""
@@ -191,7 +197,12 @@ class Options(nn.Module):
         angle = self.dribbles - torch.sign(self.dribbles) * left
         area, margin = geometry_of(geometry, "kick_area", "kick_margin")
         ahead = area - margin + margin * DRIBBLE_AHEAD
-        return self._ahead(geometry, (angle, turns, left <= FACED_DEG), DRIBBLE_DASHES, ahead)
+        choice = self._ahead(geometry, (angle, turns, left <= FACED_DEG), DRIBBLE_DASHES, ahead)
+        x, y = geometry_of(geometry, "x", "y")
+        near_own_goal = (x < -36.0) & (y.abs() < 20.0)
+        most = torch.where(near_own_goal, 45.0, torch.where(x < 16.0, 100.0, 180.0))
+        direction = _direction(geometry, self.dribbles).repeat_interleave(len(DRIBBLE_DASHES), 1)
+        return choice._replace(usual=(direction <= most) & _inside(geometry, choice.place, 1.0, 1.0))
 
     def _runs(self, geometry: Tensor) -> Choice:
         """The ball where he is himself after many dashes, with at most one turn before them."""
@@ -199,7 +210,15 @@ class Options(nn.Module):
         angle = self.runs.expand(geometry.shape[0], -1)
         turns = (angle != 0).to(angle.dtype)
         possible = angle.abs() <= 180.0 / (1 + (factor - 1) * decay)
-        return self._ahead(geometry, (angle, turns, possible), RUN_DASHES, torch.zeros_like(decay))
+        choice = self._ahead(geometry, (angle, turns, possible), RUN_DASHES, torch.zeros_like(decay))
+        ball_x = geometry_of(geometry, "ball_x")[0]
+        dashes = torch.tensor(RUN_DASHES, device=angle.device).repeat(len(self.runs))
+        most = torch.full_like(ball_x, RUN_DASHES[-1])
+        for edge, fewer in RUN_MOST:
+            most = torch.where(ball_x < edge, fewer, most)
+        direction = _direction(geometry, self.runs).repeat_interleave(len(RUN_DASHES), 1)
+        forward = (direction <= 85.0) | (ball_x >= pitch.HALF_LENGTH - 11.0)
+        return choice._replace(usual=(dashes <= most) & forward & _inside(geometry, choice.place, 2.5, 3.0))
 
     def _ahead(
         self, geometry: Tensor, directions: tuple[Tensor, Tensor, Tensor], dashes: tuple[int, ...], ahead: Tensor
@@ -222,12 +241,12 @@ class Options(nn.Module):
         place = way + coasted[..., None] * _motion(geometry)[:, None]
         rolled = (1 - BALL_DECAY**cycles) / (1 - BALL_DECAY)
         velocity = (place - _ball(geometry)[:, None]) / rolled[..., None]
-        return Choice(velocity, place, cycles, possible.repeat_interleave(len(dashes), 1))
+        possible = possible.repeat_interleave(len(dashes), 1)
+        return Choice(velocity, place, cycles, possible, possible)
 
     def columns(self, choice: Choice, geometry: Tensor) -> Tensor:
         """(batch, options, COLUMNS) what is known of each."""
         area, margin, gain, cos, sin = geometry_of(geometry, "kick_area", "kick_margin", "kick_gain", "cos", "sin")
-        x, y = geometry_of(geometry, "x", "y")
         velocity, place = choice.velocity, choice.place
         speed = torch.sqrt(velocity.square().sum(-1) + 1e-6)
         power = (velocity - _ball_velocity(geometry)[:, None]).norm(dim=-1) / gain.clamp(min=5e-3) / 100
@@ -237,7 +256,7 @@ class Options(nn.Module):
         away = torch.atan2(beside[..., 1].abs(), beside[..., 0]) / math.pi
         # As of `physics.kick_rate`.
         next_gain = 1 - 0.25 * away - 0.25 * ((off - area + margin) / margin).clamp(0.0, 1.0)
-        x, y = x + place[..., 0] * cos - place[..., 1] * sin, y + place[..., 0] * sin + place[..., 1] * cos
+        x, y = _on_pitch(geometry, place)
         to_goal = torch.hypot(pitch.HALF_LENGTH - x, y)
         heading = velocity / speed[..., None]
         single = [
@@ -255,55 +274,76 @@ class Options(nn.Module):
             heading[..., 0],
             heading[..., 1],
             choice.cycles / 10,
+            choice.usual.to(x.dtype),
         ]
         opponents = _opponents(geometry)
-        staying, going = slice(None, len(self.places)), slice(len(self.places), None)
-        pressure = _pressure(place[:, staying], opponents)
-        worth = x + (NEAR_GOAL_M - to_goal).clamp(min=0.0)
-        ahead = ((opponents[..., :2] - _ball(geometry)[:, None])[:, None] * heading[:, going, None]).sum(-1)
-        prospects = _prospects(Choice(*(part[:, going] for part in choice)), worth[:, going], opponents, ahead)
-        after, before = place.shape[1] - pressure.shape[1], pressure.shape[1]
+        n_places = len(self.places)
+        pressure = _pressure(place[:, :n_places], opponents)
+        ahead = ((opponents[..., :2] - _ball(geometry)[:, None])[:, None] * heading[:, n_places:, None]).sum(-1)
+        first = _first(place[:, n_places:], choice.cycles[:, n_places:], opponents, ahead)
+        first = functional.pad(first, (n_places, 0))
+        # Dribblers are bold, but for what is at stake.
+        stakes = (x < CARE_X_M[0]).to(x.dtype) + (x < CARE_X_M[1])
+        first = first + torch.where(self.kinds == _DRIBBLE, BOLD_CYCLES - stakes, 0.0)
+        worth = torch.where(self.kinds < _DRIBBLE, GAIN_WORTH * next_gain, x + (NEAR_GOAL_M - to_goal).clamp(min=0.0))
+        able = choice.possible & choice.usual
+        lacking = [worth - self._best(torch.where(able & (first > safe), worth, -100.0)) for safe in SAFE]
+        single += [first.clamp(-3.0, 3.0) / 3]
+        single += [lack.clamp(-most, most) / most for lack in lacking for most in (10.0, 1.0)]
         kind = functional.one_hot(self.kinds, KINDS).to(x.dtype).expand(x.shape[0], -1, -1)
+        pressure = functional.pad(pressure, (0, 0, 0, place.shape[1] - n_places))
+        return torch.cat([torch.stack(single, -1), pressure, kind], -1)
+
+    def _best(self, values: Tensor) -> Tensor:
+        """(batch, options) the greatest value of an option of the same kind."""
         return torch.cat(
-            [
-                torch.stack(single, -1),
-                functional.pad(pressure, (0, 0, 0, after)),
-                functional.pad(prospects, (0, 0, before, 0)),
-                kind,
-            ],
-            -1,
+            [part.amax(1, keepdim=True).expand_as(part) for part in torch.split(values, self.counts, dim=1)], 1
         )
 
 
 def _pressure(place: Tensor, opponents: Tensor) -> Tensor:
-    """(batch, options, 3) opponents about a ball that stays: metres to the nearest; tackles; dashes and kicks."""
+    """(batch, options, 4) opponents about a ball that stays: the nearest; tackles; dashes and kicks; who faces it."""
     ahead, aside, apart = _seen_by(opponents, place, cycles=1.0)
     tackles = (1 - tackle_failure(ahead, aside)).clamp(min=0.0).sum(-1)
     kicks = (DASH_AND_KICK_M - apart).clamp(min=0.0).sum(-1)
-    return torch.stack([apart.amin(-1).clamp(max=5.0) / 5, tackles, kicks], -1)
+    lines = torch.where(apart < NEAR_M, (REACH_M - aside.abs()).clamp(min=0.0), 0.0).sum(-1)
+    return torch.stack([apart.amin(-1).clamp(max=NEAR_M) / NEAR_M, tackles, kicks, lines], -1)
 
 
-def _prospects(choice: Choice, worth: Tensor, opponents: Tensor, ahead: Tensor) -> Tensor:
-    """(batch, options, 1 + 2 * len(SAFE)) of a ball sent ahead: by how much he has it first, and for what.
-
-    Cycles that he has it before any opponent; of those with so many the best is known, and how far this one is from it.
+def _first(place: Tensor, cycles: Tensor, opponents: Tensor, ahead: Tensor) -> Tensor:
+    """(batch, options) cycles by which a ball sent ahead is met before any opponent has it.
 
     Args:
-        worth: (batch, options) of a ball there. ahead: (batch, options, OPPONENTS) metres by which an opponent is ahead
-            of the ball in its direction: he has it a cycle sooner.
+        place, cycles: as of `Choice`. ahead: (batch, options, OPPONENTS) metres by which an opponent is ahead of the
+            ball in its direction: he has it a cycle sooner.
     """
-    forward, _, apart = _seen_by(opponents, choice.place, cycles=COASTED)
+    forward, _, apart = _seen_by(opponents, place, cycles=COASTED)
     way = (apart - REACH_M).clamp(0.0, 50.0)
     steps = way / RUN_SPEED + RISE * (1 - OPPONENT_DECAY**way)
     margin = (REACH_M / apart).clamp(max=1.0)
     faces = forward >= apart * torch.sqrt(1 - margin.square()).clamp(max=FACED)
-    steps = steps + torch.where(faces, 0.0, TURN_CYCLES) - (ahead > 0.8).to(steps.dtype)
-    first = steps.amin(-1) - choice.cycles
-    columns = [first.clamp(-3.0, 3.0) / 3]
-    for safe in SAFE:
-        best = torch.where(choice.possible & (first > safe), worth, -100.0).amax(1, keepdim=True)
-        columns += [(worth - best).clamp(-10.0, 10.0) / 5, (worth - best).clamp(-1.0, 1.0)]
-    return torch.stack(columns, -1)
+    steps = steps + torch.where(faces, 0.0, TURN_CYCLES) - (ahead > WAY_M).to(steps.dtype)
+    return steps.amin(-1) - cycles
+
+
+def _direction(geometry: Tensor, angles: Tensor) -> Tensor:
+    """(batch, angles) degrees between +x and directions, which are degrees from the body."""
+    cos, sin = geometry_of(geometry, "cos", "sin")
+    way = angles * (math.pi / 180.0)
+    ahead, aside = torch.cos(way), torch.sin(way)
+    return torch.atan2((ahead * sin + aside * cos).abs(), ahead * cos - aside * sin) * (180.0 / math.pi)
+
+
+def _on_pitch(geometry: Tensor, place: Tensor) -> tuple[Tensor, Tensor]:
+    """(batch, options) x and y of places seen from the body."""
+    x, y, cos, sin = geometry_of(geometry, "x", "y", "cos", "sin")
+    return x + place[..., 0] * cos - place[..., 1] * sin, y + place[..., 0] * sin + place[..., 1] * cos
+
+
+def _inside(geometry: Tensor, place: Tensor, off_x: float, off_y: float) -> Tensor:
+    """(batch, options) whether places lie so far within the lines."""
+    x, y = _on_pitch(geometry, place)
+    return (x.abs() <= pitch.HALF_LENGTH - off_x) & (y.abs() <= pitch.HALF_WIDTH - off_y)
 
 
 def _opponents(geometry: Tensor) -> Tensor:

@@ -44,6 +44,10 @@ def geometry(*, opponents: list[tuple[float, float]] | None = None, **values: fl
     return torch.cat([columns, others.flatten()])[None]
 
 
+BODY = len(GEOMETRY) + len(OTHER) * MATES + OTHER.index("cos")
+"""Where the body direction of the nearest opponent is."""
+
+
 def kicked(situations: torch.Tensor, options: Options | None = None) -> tuple[Mixture, Mixture]:
     """Power and direction of the options, as they are and not mirrored."""
     n = len(situations)
@@ -177,11 +181,12 @@ def test_errors_are_of_the_ball_velocity() -> None:
 
 
 def test_what_is_known_of_a_place() -> None:
-    """Of a ball kept 0.385 + 0.42 m straight ahead, with an opponent 1.5 m before it who looks the other way."""
+    """Of a ball kept 0.385 + 0.42 m straight ahead, 1.5 m before an opponent who faces +x."""
     options = Options(3, 4)
     keep = FIRST["keep"] + 20 + 15
     off = EDGES + 0.6 * MARGIN
     situation = geometry(opponents=[(10.0, -5 + off + 1.5), (30.0, 20.0)])
+    situation[0, BODY] = 1.0
     choice = options.choose(situation)
     columns = options.columns(choice, situation)
     assert columns.shape == (1, len(options.kinds), COLUMNS)
@@ -190,11 +195,17 @@ def test_what_is_known_of_a_place() -> None:
     speed = off - 0.5
     expected = [speed / 3, speed / 2.5, off, 0.0, next_gain, speed * 0.94 / (3 * next_gain), 10 / 52.5, (5 - off) / 34]
     assert columns[0, keep, :8].tolist() == pytest.approx(expected, abs=2e-3)
-    assert columns[0, keep, 9:14].tolist() == pytest.approx([0, 1, 1, 0, 0.1], abs=2e-3)
-    # His body points along +y, by cos 0 and sin 0 unknown: he is 1.5 m off, and may dash 0.6 m.
-    assert columns[0, keep, 14:17].tolist() == pytest.approx([1.5 / 5, columns[0, keep, 15].item(), 0.3], abs=1e-3)
-    assert (columns[0, keep, 17:22] == 0).all()
-    assert columns[0, keep, 22:].tolist() == [0, 1, 0, 0]
+    assert columns[0, keep, 9:15].tolist() == pytest.approx([0, 1, 1, 0, 0.1, 1], abs=2e-3)
+    # The nearest place of the three rings straight ahead has the hardest kick next.
+    assert columns[0, keep, 17] == pytest.approx(10 * (next_gain - (1 - 0.25 * 0.4)), abs=1e-4)
+    assert columns[0, keep - 20, 17] == pytest.approx(0.0, abs=1e-5)
+    # No tackle aside at 1.5 m; after a dash he is in reach; he does not face the ball.
+    assert columns[0, keep, 22:26].tolist() == pytest.approx([0.3, 0.0, 0.3, 0.0], abs=1e-3)
+    assert columns[0, keep, 26:].tolist() == [0, 1, 0, 0]
+    situation[0, BODY : BODY + 2] = torch.tensor([0.0, -1.0])
+    tackle = 1 - (1.5 / 2.0) ** 6
+    facing = options.columns(choice, situation)
+    assert facing[0, keep, 22:26].tolist() == pytest.approx([0.3, tackle, 0.3, 1.285], abs=1e-3)
 
 
 def test_what_is_known_of_a_dribble() -> None:
@@ -203,37 +214,55 @@ def test_what_is_known_of_a_dribble() -> None:
     straight = FIRST["dribble"] + 3 * 8
     place = -5 + 0.6 + 0.84 + EDGES + 0.2 * MARGIN
     situation = geometry(opponents=[(10.0, place + 4)])
-    situation[0, len(GEOMETRY) + len(OTHER) * MATES + OTHER.index("sin")] = -1.0
+    situation[0, BODY + 1] = -1.0
     choice = options.choose(situation)
     assert choice.place[0, straight].tolist() == pytest.approx([place + 5, 0.0], abs=1e-4)
     columns = options.columns(choice, situation)
     speed = (place + 4.5) / (1 + 0.94 + 0.94**2)
     assert columns[0, straight, 0] == pytest.approx(speed / 3, abs=1e-5)
-    assert (columns[0, straight, 14:17] == 0).all()
+    assert (columns[0, straight, 22:26] == 0).all()
+    assert columns[0, straight, 26:].tolist() == [0, 0, 1, 0]
     way = 4 - 1.285
-    first = way + 2 / 3 * (1 - 0.4**way) - 1 - 3
-    assert columns[0, straight, 17] == pytest.approx(max(first / 3, -1), abs=1e-4)
-    assert columns[0, straight, 22:].tolist() == [0, 0, 1, 0]
-    # Turned away he needs two cycles more; moving towards him, less.
-    situation[0, len(GEOMETRY) + len(OTHER) * MATES + OTHER.index("sin")] = 1.0
-    turned = options.columns(options.choose(situation), situation)
-    assert turned[0, straight, 17] == pytest.approx((first + 2) / 3, abs=1e-4)
+    # At x = 10 one cycle of his boldness is lost.
+    first = way + 2 / 3 * (1 - 0.4**way) - 1 - 3 + 1.5 - 1
+    assert columns[0, straight, 15] == pytest.approx(first / 3, abs=1e-4)
+    # Turned away he needs two cycles more.
+    situation[0, BODY + 1] = 1.0
+    turned = options.columns(choice, situation)
+    assert turned[0, straight, 15] == pytest.approx((first + 2) / 3, abs=1e-4)
 
 
-def test_the_best_safe_place_is_told() -> None:
-    """With nobody there all are safe: nothing is better than the best, which is as near to the goal as one may come."""
+@pytest.mark.parametrize("kind", ["dribble", "run"])
+def test_the_best_safe_place_is_told(kind: str) -> None:
+    """With nobody there all are safe: the best of a kind is the one furthest ahead, and lacks nothing."""
     options = Options(3, 4)
     situation = geometry(cos=1, sin=0, y=0, ball_x=10.5, ball_y=0)
     choice = options.choose(situation)
-    columns = options.columns(choice, situation)
-    going = columns[0, FIRST["dribble"] :, 17:]
-    possible = choice.possible[0, FIRST["dribble"] :]
-    assert (going[:, 0] == 1).all()
-    for column in (1, 2, 3, 4):
-        assert going[possible, column].max() == pytest.approx(0.0, abs=1e-5)
-    best = int(torch.where(possible, going[:, 1], -9.0).argmax())
-    ahead = choice.place[0, FIRST["dribble"] :, 0]
-    assert ahead[best] == torch.where(possible, ahead, -9.0).max()
+    of_kind = choice.possible[0] & choice.usual[0] & (options.kinds == list(FIRST).index(kind))
+    columns = options.columns(choice, situation)[0, of_kind]
+    ahead = choice.place[0, of_kind, 0]
+    assert (columns[:, 15] == 1).all() or kind == "dribble"
+    for column in range(16, 22):
+        assert columns[:, column].max() == pytest.approx(0.0, abs=1e-5)
+        assert columns[ahead.argmax(), column] == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "count"),
+    [
+        ("dribble", {}, 3 * 9),  # at x < 16 not further back than 100 deg
+        ("dribble", {"cos": 1, "sin": 0}, 3 * 9),
+        ("dribble", {"cos": 1, "sin": 0, "x": 20, "ball_x": 20.5}, 48),
+        ("dribble", {"cos": 1, "sin": 0, "x": -40, "ball_x": -39.5}, 3 * 5),  # near the own goal 45 deg
+        ("run", {"cos": 1, "sin": 0, "x": -40, "ball_x": -39.5}, 17 * 2),  # 5 and 6 dashes
+        ("run", {"cos": 1, "sin": 0, "x": -10, "ball_x": -9.5}, 17 * 3),
+        ("run", {"cos": 0, "sin": 1, "x": 5, "ball_x": 5}, 8 * 9),  # to the right, by which he turns to +x
+    ],
+)
+def test_what_is_usual_where(kind: str, values: dict[str, float], count: int) -> None:
+    options = Options(3, 4)
+    usual = options.choose(geometry(**values)).usual[0]
+    assert int((usual & (options.kinds == list(FIRST).index(kind))).sum()) == count
 
 
 def test_agents_of_real_matches_choose_among_them(samples_dir: Path, tmp_path: Path) -> None:
@@ -268,6 +297,4 @@ def test_what_is_known_is_mirrored() -> None:
     nearest, partner = torch.where(same_kind, away, 9.0).min(1)
     assert nearest.max() < 1e-3
     columns, expected = options.columns(choice, one) * options.signs, options.columns(turned, other)[:, partner]
-    # As many cycles may lead to the same velocity.
-    torch.testing.assert_close(columns[..., :13], expected[..., :13], atol=1e-3, rtol=1e-3)
-    torch.testing.assert_close(columns[..., 14:17], expected[..., 14:17], atol=1e-3, rtol=1e-3)
+    torch.testing.assert_close(columns, expected, atol=2e-3, rtol=1e-3)

@@ -46,10 +46,13 @@ from teamclone.evaluation.outcome import Outcome
 from teamclone.files import write_json
 from teamclone.machine import processor
 from teamclone.models.config import BLOCKS
-from teamclone.models.network import parameter_count
+from teamclone.models.heads import MixtureHead
+from teamclone.models.kicks import COUNT
+from teamclone.models.network import Clone, parameter_count
+from teamclone.models.options import FAR_M, IMPOSSIBLE
 from teamclone.models.physics import kickable_area, reach_ball
-from teamclone.models.relative import RelativeFeatures
-from teamclone.models.state import CHANNEL, State
+from teamclone.models.relative import RelativeFeatures, geometry_of
+from teamclone.models.state import CHANNEL, State, Target
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
@@ -92,7 +95,8 @@ KICKS: dict[str, tuple[str, ...]] = {
     "lists": PLAIN[:3],
     "without-kicks": ("train.kicks=0",),
 }
-"""What kicks may know of the other players and of what there is to choose from, and how often they are shown: name and settings beside the preset's."""
+"""What kicks may know of the other players and of what there is to choose from, and how often they are shown: name and
+settings beside the preset's."""
 REMEDIES: dict[str, tuple[str, ...]] = {
     "oversample": ("train.balance=oversample", "train.balance_strength=0.5"),
     "undersample": ("train.balance=undersample", "train.balance_strength=0.5"),
@@ -523,6 +527,30 @@ class Work:
                 name: by_situation(stacked[:, mask], bare.kind[mask], where[mask]) for name, mask in self.sets.items()
             }
             found["ensemble"] = self.figures(together)
+        if is_run(self.out / "runs" / "best-0"):
+            found["kicks"] = self.kicks()
+        return found
+
+    def kicks(self) -> dict[str, dict[str, Any]]:
+        """By set, of its kicks: how many are which of the options that agents have, and what `best-0` says of them."""
+        model = open_run(self.out / "runs" / "best-0").load_model().eval()
+        if not isinstance(model.head, MixtureHead) or model.head.kick.options is None:
+            return {}
+        found = {}
+        kinds = self.dataset.samples["kind"].numpy()[self.rows]
+        for name, mask in self.sets.items():
+            rows = self.rows[mask & (kinds == CLONED.index("kick"))]
+            with torch.inference_mode():
+                columns = model.features(self.dataset.state(rows, history=model.features.history))
+                given, likeliest = options_given(model, columns, self.dataset.target(rows))
+            counts = [int((given == kind).sum()) for kind in range(len(OPTION_KINDS))]
+            hit = given < OTHER_KICK
+            found[name] = {
+                "kicks": len(rows),
+                "share": [count / max(len(rows), 1) for count in counts],
+                "likeliest": [float(likeliest[given == kind].float().mean()) for kind in range(OTHER_KICK)],
+                "likeliest_of_all": float(likeliest[hit].float().mean()),
+            }
         return found
 
 
@@ -542,6 +570,33 @@ def _whole(settings: dict[str, Any]) -> dict[str, Any]:
 
 def chunks(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
     return (rows[start : start + CHUNK] for start in range(0, len(rows), CHUNK))
+
+
+OPTION_KINDS = ("to kick it on", "to keep it", "dribble", "run", "another")
+OTHER_KICK = len(OPTION_KINDS) - 1
+EXACT = 0.002
+"""Metres per cycle by which the velocity of the ball after a kick may miss that of an option; logs have four digits."""
+
+
+def options_given(model: Clone, columns: torch.Tensor, target: Target) -> tuple[torch.Tensor, torch.Tensor]:
+    """Which of OPTION_KINDS kicks are, and whether the very option is the one that a model with `Options` holds for the
+    likeliest of them, (n,) each.
+
+    Args:
+        columns: (n, columns) as of ``model.features``.
+    """
+    answers = model.answer(columns).kick
+    options, first = model.head.kick.options, COUNT
+    gain = geometry_of(columns[:, model.features.n_inputs :], "kick_gain")[0]
+    power, angle = answers[0].power.centre[:, first:], answers[0].direction.centre[:, first:]
+    given = torch.polar(gain[:, 0] * target.parameters[:, 0], torch.deg2rad(target.parameters[:, 1]))
+    missed = (torch.polar(gain * power, angle) - given[:, None]).abs()
+    # Options come in one order in both answers.
+    share = torch.stack([answer.power.logits.softmax(1)[:, first:] for answer in answers]).mean(0)
+    missed = torch.where(answers[0].power.logits[:, first:] > IMPOSSIBLE, missed, FAR_M)
+    away, nearest = missed.min(1)
+    kind = torch.where(away < EXACT, options.kinds[nearest], OTHER_KICK)
+    return kind, share.argmax(1) == nearest
 
 
 SITUATIONS = ("ball kickable", "first of his team to the ball", "off the ball")
@@ -708,6 +763,7 @@ def main() -> None:
         cleaning=work.dataset.meta["cleaning"],
         commands=[work.told(command) for command in (*work.commands, *map(work.training, there))],
         situations=SITUATIONS,
+        option_kinds=OPTION_KINDS,
         sure=SURE,
     )
     print(page)

@@ -76,6 +76,7 @@ def write(
     cleaning: Mapping[str, Any] | None,
     commands: Sequence[str],
     situations: Sequence[str],
+    option_kinds: Sequence[str],
     sure: float,
 ) -> None:
     """Write the page, and beside it the plot of the learning curve.
@@ -89,7 +90,7 @@ def write(
         parts += [_protocol(cleaning)]
     parts += [_goals(results), _spread(results), _numbers(results), _likelihood(results)]
     parts += [_variants("Training", TRAINING_TEXT, results, variants.get("t", {}), beside="best-0")]
-    parts += [_kicks(results, variants.get("k", {}))]
+    parts += [_kicks(results, variants.get("k", {})), _options(left.get("kicks", {}), option_kinds)]
     parts += [_variants("What each part gains", ABLATIONS_TEXT, results, variants.get("d", {}))]
     parts += [_variants("Rare commands", REMEDIES_TEXT, results, variants.get("e", {}), rare=True)]
     curve = left.get("curve")
@@ -437,6 +438,27 @@ A power law that falls to a floor, `floor + scale * matches ^ -exponent`, fitted
 more matches alone would leave; from so few points it is a rough guess, as the fits without any one point show.
 
 {table(headers, fits)}"""
+
+
+def _options(found: Mapping[str, Any], kinds: Sequence[str]) -> str:
+    """What kicks are, of step g."""
+    if not found:
+        return ""
+    rows = [
+        [
+            name,
+            f"{row['kicks']:,}",
+            *(f"{100 * share:.0f} %" for share in row["share"]),
+            f"{100 * row['likeliest_of_all']:.0f} %",
+            " / ".join(f"{100 * share:.0f}" for share in row["likeliest"]),
+        ]
+        for name, row in found.items()
+    ]
+    headers = ("set", "kicks", *kinds, "likeliest option given", "the same by kind, %")
+    return f"""Kicks that are one of the options of [`model.kick_options`](train.md#what-the-preset-best-trains), to two
+millimetres per cycle, by kind; and how often the very option, of 427, is the one that `best-0` holds for the likeliest.
+
+{table(headers, rows)}"""
 
 
 def _left(left: Mapping[str, Any], results: Results, *, situations: Sequence[str], sure: float) -> str:

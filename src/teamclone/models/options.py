@@ -36,7 +36,13 @@ FACED_DEG = 10.0
 RUN_STEP_DEG, RUN_SIDE, RUN_DASHES = 6.0, 8, tuple(range(5, 21))
 """Directions of a run behind the ball: their distance, how many to each side; at most one turn; its dashes."""
 RUN_MOST = (20.0, 15), (10.0, 13), (0.0, 7), (-20.0, 6)
-"""Most dashes of a run where the ball's x is less; elsewhere all."""
+"""Most dashes of a usual run where the ball's x is less; elsewhere all."""
+OWN_GOAL_M, DRIBBLE_BACK_X_M, DRIBBLE_WIDEST_DEG = (-36.0, 20.0), 16.0, (45.0, 100.0, 180.0)
+"""Usual dribbles go at most so far round from +x: near the own goal, behind an x, elsewhere."""
+RUN_BACK_X_M, RUN_WIDEST_DEG = 41.5, 85.0
+"""Usual runs do, but for those from beyond this x."""
+DRIBBLE_INSIDE_M, RUN_INSIDE_M = (1.0, 1.0), (2.5, 3.0)
+"""How far within the lines they end."""
 KINDS = 4
 """Kick on, keep, dribble, run."""
 _DRIBBLE = 2
@@ -199,10 +205,11 @@ class Options(nn.Module):
         ahead = area - margin + margin * DRIBBLE_AHEAD
         choice = self._ahead(geometry, (angle, turns, left <= FACED_DEG), DRIBBLE_DASHES, ahead)
         x, y = geometry_of(geometry, "x", "y")
-        near_own_goal = (x < -36.0) & (y.abs() < 20.0)
-        most = torch.where(near_own_goal, 45.0, torch.where(x < 16.0, 100.0, 180.0))
+        near_own_goal = (x < OWN_GOAL_M[0]) & (y.abs() < OWN_GOAL_M[1])
+        at_own_goal, behind, elsewhere = DRIBBLE_WIDEST_DEG
+        widest = torch.where(near_own_goal, at_own_goal, torch.where(x < DRIBBLE_BACK_X_M, behind, elsewhere))
         direction = _direction(geometry, self.dribbles).repeat_interleave(len(DRIBBLE_DASHES), 1)
-        return choice._replace(usual=(direction <= most) & _inside(geometry, choice.place, 1.0, 1.0))
+        return choice._replace(usual=(direction <= widest) & _inside(geometry, choice.place, DRIBBLE_INSIDE_M))
 
     def _runs(self, geometry: Tensor) -> Choice:
         """The ball where he is himself after many dashes, with at most one turn before them."""
@@ -217,8 +224,8 @@ class Options(nn.Module):
         for edge, fewer in RUN_MOST:
             most = torch.where(ball_x < edge, fewer, most)
         direction = _direction(geometry, self.runs).repeat_interleave(len(RUN_DASHES), 1)
-        forward = (direction <= 85.0) | (ball_x >= pitch.HALF_LENGTH - 11.0)
-        return choice._replace(usual=(dashes <= most) & forward & _inside(geometry, choice.place, 2.5, 3.0))
+        forward = (direction <= RUN_WIDEST_DEG) | (ball_x >= RUN_BACK_X_M)
+        return choice._replace(usual=(dashes <= most) & forward & _inside(geometry, choice.place, RUN_INSIDE_M))
 
     def _ahead(
         self, geometry: Tensor, directions: tuple[Tensor, Tensor, Tensor], dashes: tuple[int, ...], ahead: Tensor
@@ -282,7 +289,7 @@ class Options(nn.Module):
         ahead = ((opponents[..., :2] - _ball(geometry)[:, None])[:, None] * heading[:, n_places:, None]).sum(-1)
         first = _first(place[:, n_places:], choice.cycles[:, n_places:], opponents, ahead)
         first = functional.pad(first, (n_places, 0))
-        # Dribblers are bold, but for what is at stake.
+        # Dribblers are bold, but not where much is at stake.
         stakes = (x < CARE_X_M[0]).to(x.dtype) + (x < CARE_X_M[1])
         first = first + torch.where(self.kinds == _DRIBBLE, BOLD_CYCLES - stakes, 0.0)
         worth = torch.where(self.kinds < _DRIBBLE, GAIN_WORTH * next_gain, x + (NEAR_GOAL_M - to_goal).clamp(min=0.0))
@@ -340,10 +347,10 @@ def _on_pitch(geometry: Tensor, place: Tensor) -> tuple[Tensor, Tensor]:
     return x + place[..., 0] * cos - place[..., 1] * sin, y + place[..., 0] * sin + place[..., 1] * cos
 
 
-def _inside(geometry: Tensor, place: Tensor, off_x: float, off_y: float) -> Tensor:
-    """(batch, options) whether places lie so far within the lines."""
+def _inside(geometry: Tensor, place: Tensor, off: tuple[float, float]) -> Tensor:
+    """(batch, options) whether places lie so far within the lines, along the pitch and across it."""
     x, y = _on_pitch(geometry, place)
-    return (x.abs() <= pitch.HALF_LENGTH - off_x) & (y.abs() <= pitch.HALF_WIDTH - off_y)
+    return (x.abs() <= pitch.HALF_LENGTH - off[0]) & (y.abs() <= pitch.HALF_WIDTH - off[1])
 
 
 def _opponents(geometry: Tensor) -> Tensor:

@@ -105,9 +105,7 @@ def test_kicks_are_told_by_their_option() -> None:
         values[:4] = torch.stack([of[range(4), chosen] for of in (power, torch.rad2deg(angle))], 1)
         target = Target(torch.full((5,), fidelity.CLONED.index("kick")), values)
         given, likeliest = fidelity.options_given(model, columns, target)
-        best = (kick.power.logits.softmax(1) + model.answer(columns).kick[1].power.logits.softmax(1))[
-            :, fidelity.COUNT :
-        ]
+        shares = [answer.power.logits.softmax(1)[:, fidelity.COUNT :] for answer in model.answer(columns).kick]
     assert given.tolist() == [0, 1, 2, 3, fidelity.OTHER_KICK]
     assert likeliest[:4].tolist() == [int(sum(shares)[row].argmax()) == chosen[row] for row in range(4)]
 

@@ -212,13 +212,16 @@ def _goals(results: Results) -> str:
             silent = several[0]["name"] == "tree" and "error" in title and "ECE" not in title
             cells = [NOTHING if silent else number(mean(several, name, find), digits) for name in names]
             rows[-1].append(NOTHING if set(cells) == {NOTHING} else " / ".join(cells))
-    lost, minutes = ["accuracy lost on unseen opponents", LOST_GOAL], ["training time, minutes", MINUTES_GOAL]
+    lost, minutes = (
+        ["accuracy lost on unseen opponents", LOST_GOAL],
+        ["training time, minutes, the quickest seed", MINUTES_GOAL],
+    )
     for _, several in columns:
         accuracies = [mean(several, name, FIGURES[0][1]) for name in names]
         known = [figure for figure, name in zip(accuracies, names, strict=True) if name != "unseen"]
         lost.append(signed(np.mean(known) - accuracies[-1], 3) if known and "unseen" in names else NOTHING)
-        times = [result["seconds"] / 60 for result in several if "seconds" in result]
-        minutes.append(number(float(np.mean(times)), 1) if times else NOTHING)
+        times = [(result["seconds"] / 60, result["machine"]["threads"]) for result in several if "seconds" in result]
+        minutes.append("{:.1f} on {} threads".format(*min(times)) if times else NOTHING)
     about = ""
     if results:
         tackles = [next(iter(results.values()))["sets"][name]["all"]["commands"]["tackle"]["support"] for name in names]

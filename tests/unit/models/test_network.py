@@ -267,10 +267,10 @@ def test_turns_teach_the_aims_and_nothing_else_through_their_own_bell() -> None:
     assert model.head.loss(others, without, aim_weight=0.5).total == model.head.loss(others, without).total
 
 
-@pytest.mark.parametrize("members", [1, 2])
-def test_kicks_may_be_answered_where_they_are_asked_for(members: int) -> None:
+@pytest.mark.parametrize("config", [SMALL, replace(SMALL, members=2), MODELS["options"]], ids=("one", "two", "options"))
+def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> None:
     """What is asked for is the same, and the rest of the answer, too."""
-    model = Clone(replace(SMALL, members=members)).eval()
+    model = Clone(config).eval()
     state = situations(40)
     target = likely_target(state)
     model.inputs.fit([model.inputs.project(state)])
@@ -292,8 +292,9 @@ def test_kicks_may_be_answered_where_they_are_asked_for(members: int) -> None:
     assert (points[1].parameters[others, 3:] == 0).all()
 
 
-def test_a_batch_without_kicks_learns() -> None:
-    model = Clone(SMALL)
+@pytest.mark.parametrize("config", [SMALL, MODELS["options"]], ids=("free", "options"))
+def test_a_batch_without_kicks_learns(config: ModelConfig) -> None:
+    model = Clone(config)
     state = situations(12)
     target = likely_target(state)._replace(kind=torch.arange(12) % 2)
     model.inputs.fit([model.inputs.project(state)])

@@ -137,7 +137,7 @@ def test_resumed_is_as_never_interrupted(base: Run, team: Dataset, tmp_path: Pat
 def test_relative_inputs_and_mixtures_are_adapted_too(team: Dataset, tmp_path: Path) -> None:
     small = (
         *("model.hidden=[16]", "model.aim_hidden=[8]", "model.parameter_hidden=[8]", "model.kick_hidden=[8]"),
-        "train.epochs=1",
+        *("train.kicks=128", "train.epochs=1"),
     )
     first = train(load_config("best", [*SHORT, *QUIET, *small]), team, tmp_path / "base")
     run = adapt(first, team, tmp_path / "run", "train.epochs=1")

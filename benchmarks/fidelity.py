@@ -543,15 +543,20 @@ class Work:
             with torch.inference_mode():
                 columns = model.features(self.dataset.state(rows, history=model.features.history))
                 given, likeliest = options_given(model, columns, self.dataset.target(rows))
-            counts = [int((given == kind).sum()) for kind in range(len(OPTION_KINDS))]
-            hit = given < OTHER_KICK
+            by_kind = [given == kind for kind in range(len(OPTION_KINDS))]
             found[name] = {
                 "kicks": len(rows),
-                "share": [count / max(len(rows), 1) for count in counts],
-                "likeliest": [float(likeliest[given == kind].float().mean()) for kind in range(OTHER_KICK)],
-                "likeliest_of_all": float(likeliest[hit].float().mean()),
+                "options": len(model.head.kick.options.kinds),
+                "share": [_share(kind) for kind in by_kind],
+                "likeliest": [_share(likeliest[kind]) for kind in by_kind[:OTHER_KICK]],
+                "likeliest_of_all": _share(likeliest[given < OTHER_KICK]),
             }
         return found
+
+
+def _share(of: torch.Tensor) -> float | None:
+    """What part is true; None of nothing."""
+    return float(of.float().mean()) if len(of) else None
 
 
 def _is_of(folder: Path, config: Config, data: Path) -> bool:

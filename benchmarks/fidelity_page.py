@@ -137,6 +137,10 @@ def mean(several: Sequence[Mapping[str, Any]], name: str, find: Callable[[Any], 
     return float(np.mean([value(find(result["sets"][name][who])) for result in several]))
 
 
+def percent(share: float | None) -> str:
+    return NOTHING if share is None else f"{100 * share:.0f} %"
+
+
 def number(figure: float, digits: int) -> str:
     return NOTHING if not np.isfinite(figure) else f"{figure:.{digits}f}"
 
@@ -451,15 +455,16 @@ def _options(found: Mapping[str, Any], kinds: Sequence[str]) -> str:
         [
             name,
             f"{row['kicks']:,}",
-            *(f"{100 * share:.0f} %" for share in row["share"]),
-            f"{100 * row['likeliest_of_all']:.0f} %",
-            " / ".join(f"{100 * share:.0f}" for share in row["likeliest"]),
+            *(percent(share) for share in (*row["share"], row["likeliest_of_all"])),
+            " / ".join(percent(share) for share in row["likeliest"]),
         ]
         for name, row in found.items()
     ]
-    headers = ("set", "kicks", *kinds, "likeliest option given", "the same by kind, %")
+    headers = ("set", "kicks", *kinds, "likeliest option given", "the same by kind")
+    options = next(iter(found.values()))["options"]
     return f"""Kicks that are one of the options of [`model.kick_options`](train.md#what-the-preset-best-trains), to two
-millimetres per cycle, by kind; and how often the very option, of 427, is the one that `best-0` holds for the likeliest.
+millimetres per cycle, by kind; and how often the very option, of {options}, is the one that `best-0` holds for the
+likeliest.
 
 {table(headers, rows)}"""
 

@@ -49,6 +49,7 @@ _DRIBBLE = 2
 COLUMNS, ASIDE = 30, (10, 12)
 """Inputs of each: `Options.columns`; and which of them change their sign where left and right are exchanged."""
 HIDDEN = 32
+"""Width of the layers that decide on shares."""
 OPPONENTS = 6
 """The nearest, who are looked at."""
 NEAR_M, FAR_M = 5.0, 1000.0
@@ -168,9 +169,7 @@ class Options(nn.Module):
         """What there is to choose from."""
         parts = [self._places(geometry), self._dribbles(geometry), self._runs(geometry)]
         velocity, place, cycles, possible, usual = (torch.cat(part, 1) for part in zip(*parts, strict=True))
-        gain = geometry_of(geometry, "kick_gain")[0]
-        power = (velocity - _ball_velocity(geometry)[:, None]).norm(dim=-1) / gain.clamp(min=5e-3)
-        possible = possible & (power <= 100.5) & (velocity.norm(dim=-1) <= BALL_SPEED_MAX + 0.01)
+        possible = possible & (_power(velocity, geometry) <= 100.5) & (velocity.norm(dim=-1) <= BALL_SPEED_MAX + 0.01)
         return Choice(velocity, place, cycles, possible, usual)
 
     def _places(self, geometry: Tensor) -> Choice:
@@ -253,10 +252,9 @@ class Options(nn.Module):
 
     def columns(self, choice: Choice, geometry: Tensor) -> Tensor:
         """(batch, options, COLUMNS) what is known of each."""
-        area, margin, gain, cos, sin = geometry_of(geometry, "kick_area", "kick_margin", "kick_gain", "cos", "sin")
+        area, margin, cos, sin = geometry_of(geometry, "kick_area", "kick_margin", "cos", "sin")
         velocity, place = choice.velocity, choice.place
         speed = torch.sqrt(velocity.square().sum(-1) + 1e-6)
-        power = (velocity - _ball_velocity(geometry)[:, None]).norm(dim=-1) / gain.clamp(min=5e-3) / 100
         # From where the player is in the next cycle.
         beside = _ball(geometry)[:, None] + velocity - _motion(geometry)[:, None]
         off = torch.sqrt(beside.square().sum(-1) + 1e-6)
@@ -268,7 +266,7 @@ class Options(nn.Module):
         heading = velocity / speed[..., None]
         single = [
             speed / BALL_SPEED_MAX,
-            power.clamp(max=2.0),
+            (_power(velocity, geometry) / 100).clamp(max=2.0),
             off.clamp(max=3.0),
             away,
             next_gain,
@@ -371,6 +369,13 @@ def _seen_by(opponents: Tensor, place: Tensor, *, cycles: float) -> tuple[Tensor
     x, y, vx, vy, cos, sin = opponents[:, None].unbind(-1)
     x, y = place[..., 0, None] - x - cycles * vx, place[..., 1, None] - y - cycles * vy
     return x * cos + y * sin, y * cos - x * sin, torch.sqrt(x.square() + y.square() + 1e-6)
+
+
+def _power(velocity: Tensor, geometry: Tensor) -> Tensor:
+    """(batch, options) of the kick that gives the ball a velocity."""
+    gain = geometry_of(geometry, "kick_gain")[0]
+    added: Tensor = (velocity - _ball_velocity(geometry)[:, None]).norm(dim=-1)
+    return added / gain.clamp(min=5e-3)
 
 
 def _turned(geometry: Tensor, x: Tensor, y: Tensor) -> Tensor:

@@ -196,8 +196,8 @@ def test_the_learning_curve_is_a_table_and_a_plot(work: fidelity.Work, tmp_path:
         for count in MATCHES
     }
     left = work.what_is_left(results)
-    left["kicks"] = {"unseen": {"kicks": 1234, "share": [0.2, 0.1, 0.3, 0.15, 0.25]}}
-    left["kicks"]["unseen"] |= {"likeliest": [0.21, 0.22, 0.53, 0.34], "likeliest_of_all": 0.36}
+    left["kicks"] = {"unseen": {"kicks": 1234, "options": 427, "share": [0.2, 0.1, 0.3, 0.15, 0.25]}}
+    left["kicks"]["unseen"] |= {"likeliest": [0.21, None, 0.53, 0.34], "likeliest_of_all": 0.36}
     # All of these say the same, whatever the number of matches.
     for name, fit in left["curve"].items():
         assert fit["scale"] == pytest.approx(0.0, abs=1e-9)
@@ -215,5 +215,5 @@ def test_the_learning_curve_is_a_table_and_a_plot(work: fidelity.Work, tmp_path:
     )
     text = (tmp_path / "page.md").read_text()
     assert "![Cross-entropy by training matches](page.svg)" in text
-    assert "| unseen | 1,234 | 20 % | 10 % | 30 % | 15 % | 25 % | 36 % | 21 / 22 / 53 / 34 |" in text
+    assert "| unseen | 1,234 | 20 % | 10 % | 30 % | 15 % | 25 % | 36 % | 21 % / - / 53 % / 34 % |" in text
     assert (tmp_path / "page.svg").read_text().startswith("<?xml")

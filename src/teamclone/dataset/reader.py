@@ -36,6 +36,8 @@ from teamclone.rcss.playmodes import OTHER_SIDE
 
 Rows = NDArray[np.int64] | Tensor
 """Indices of samples, (batch,) int64."""
+CHECKED_FRAMES = 2**17
+"""Frames that are looked at together; bounds memory."""
 
 
 @cache
@@ -96,6 +98,28 @@ class Dataset:
     def split(self, split: Split) -> NDArray[np.int64]:
         """The samples of a split, ascending."""
         return np.flatnonzero(self.samples["split"].numpy() == int(split))
+
+    def need(self, channels: Sequence[str], rows: NDArray[np.int64]) -> None:
+        """See that the frames of these samples hold the ball and these of PLAYER_CHANNELS: not every log has all.
+
+        Raises:
+            DatasetError: a match lacks one.
+        """
+        frames = np.unique(self.samples["frame"].numpy()[rows])
+        for start in range(0, len(frames), CHECKED_FRAMES):
+            part = frames[start : start + CHECKED_FRAMES]
+            ball = self.frames["ball"].numpy()[part]
+            detail, code = (self.frames[name].numpy()[part] for name in ("detail", "code"))
+            lacking = {f"ball_{name}": np.isnan(ball[:, index]) for index, name in enumerate(("x", "y", "vx", "vy"))}
+            lacking |= {name: (detail[..., DETAIL[name]] == MISSING).any(1) for name in channels if name in DETAIL}
+            lacking |= {name: (code[..., CODE[name]] == NO_CODE).any(1) for name in channels if name in CODE}
+            for name, column in lacking.items():
+                if column.any():
+                    match = self.matches[int(self.frames["match"][part[column][0]])]
+                    raise DatasetError(
+                        f"{self.path}: match {match['match_id']} has no {name} in its log, which the model needs; "
+                        "make the dataset without it"
+                    )
 
     def state(self, rows: Rows, *, history: int = 0) -> State:
         """The situations in which the commands of these samples were decided, in the order asked for.

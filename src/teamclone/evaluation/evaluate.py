@@ -70,8 +70,12 @@ def predict(
         inputs: (n, columns) what the features project from these samples, for who has it already; None makes it.
         batch: samples per pass.
         on_batch: called with the number of samples just done.
+
+    Raises:
+        DatasetError: a match lacks what the model needs.
     """
     n = len(rows)
+    dataset.need(model.inputs.channels, rows)
     model.eval()
     device = next(model.parameters()).device
     outcome, mode = _empty(n, dataset.commands), np.empty(n, np.int64)

@@ -47,11 +47,12 @@ def measure_latency(
     reading the state is not.
 
     Raises:
-        DatasetError: the dataset has no samples.
+        DatasetError: the dataset has no samples, or a match lacks what the model needs.
     """
     if not len(dataset):
         raise DatasetError(f"{dataset.path}: no samples to predict; build the dataset from more matches")
     rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + TEAM)
+    dataset.need(model.inputs.channels, rows)
     states = dataset.state(rows, history=model.inputs.history)
     singles = [_slice(states, start, 1) for start in range(N_STATES)]
     teams = [_slice(states, start, TEAM) for start in range(N_STATES)]

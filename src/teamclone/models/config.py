@@ -9,7 +9,8 @@ from teamclone.rcss.commands import CLONED
 FEATURE_SETS = ("paper", "relative")
 """Sets of inputs; the modules are `features.PaperFeatures` and `relative.RelativeFeatures`."""
 BLOCKS = (
-    "self", "role", "type", "last", "view", "ball", "reach", "lines", "mates", "opponents", "rivals", "past", "mode",
+    "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
+    "mode",
 )  # fmt: skip
 """Blocks of the relative inputs, in the order of their columns; see `relative.RelativeFeatures`."""
 HEADS = ("point", "mixture")

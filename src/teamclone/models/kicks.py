@@ -13,9 +13,10 @@ from torch.nn import functional
 from teamclone.models import mixture
 from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
-from teamclone.models.options import Options
+from teamclone.models.options import IMPOSSIBLE, USUAL_ERROR, Options
 from teamclone.models.physics import covered
-from teamclone.models.relative import MATES, geometry_of, mates_of
+from teamclone.models.relative import MATES, geometry_of, mates_of, ways_of
+from teamclone.planning.plan import WAYS
 from teamclone.rcss import pitch
 
 FREE = 3
@@ -31,6 +32,45 @@ AHEAD_M = 0.6
 COUNT = MATES + 1 + FREE + len(DRIBBLES)
 
 
+def kick_for(wanted: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
+    """Power, at most 150, and direction, radians from the body, of kicks after which the ball has a velocity.
+
+    Args:
+        wanted: (batch, components, 2) metres per cycle on the pitch.
+    """
+    vx, vy, cos, sin, gain = geometry_of(geometry, "ball_vx", "ball_vy", "cos", "sin", "kick_gain")
+    x, y = wanted[..., 0] - vx, wanted[..., 1] - vy
+    power = torch.sqrt(x.square() + y.square() + 1e-6) / gain.clamp(min=5e-3)
+    return power.clamp(max=150.0), torch.atan2(y * cos - x * sin, x * cos + y * sin)
+
+
+class Planned(nn.Module):
+    """Components of power and direction of a kick, one for each way that a plan knows (`planning.plan`).
+
+    Attributes:
+        error: (WAYS,) logarithm of the velocities by which kicks miss what was planned, in USUAL_ERROR.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.share = nn.Linear(width, len(WAYS))
+        self.error = nn.Parameter(torch.zeros(len(WAYS)))
+
+    def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
+        """As of `Kicks`."""
+        share = self.share(hidden).float()
+        with torch.autocast(hidden.device.type, enabled=False):
+            ways = ways_of(geometry)
+            logits = torch.where(ways[..., 0] > 0, share, IMPOSSIBLE)
+            power, angle = kick_for(ways[..., 1:], geometry)
+            gain = geometry_of(geometry, "kick_gain")[0].clamp(min=5e-3)
+            error = USUAL_ERROR * self.error.exp()
+            return (
+                Mixture(logits, power, LEAST_POWER + error / gain),
+                Mixture(logits, angle, LEAST_ANGLE + error / (gain * power)),
+            )
+
+
 class Kicks(nn.Module):
     """Mixtures of power and direction of a kick, both with the shares of the same COUNT components.
 
@@ -38,16 +78,18 @@ class Kicks(nn.Module):
         width: of what a kick is decided on.
         target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
         options: add those of `options.Options`, which need a target width.
+        planned: add those of `Planned`; the geometry ends in WAY then.
     """
 
     goal: Tensor
     cycles: Tensor
 
-    def __init__(self, width: int, target_width: int = 0, *, options: bool = False) -> None:
+    def __init__(self, width: int, target_width: int = 0, *, options: bool = False, planned: bool = False) -> None:
         super().__init__()
         self.layer = nn.Linear(width, 6 * COUNT)
         self.target = nn.Linear(target_width, 6) if target_width else None
         self.options = Options(width, target_width) if options else None
+        self.planned = Planned(width) if planned else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
@@ -58,12 +100,14 @@ class Kicks(nn.Module):
             hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
             targets: (batch, TARGETS, target width), None for nothing.
         """
-        free = self._free(hidden, geometry, targets)
-        if self.options is None or targets is None:
-            return free
-        power, angle = (
-            mixture.side_by_side(pair) for pair in zip(free, self.options(hidden, geometry, targets), strict=True)
-        )
+        parts = [self._free(hidden, geometry, targets)]
+        if self.planned is not None:
+            parts.append(self.planned(hidden, geometry))
+        if self.options is not None and targets is not None:
+            parts.append(self.options(hidden, geometry, targets))
+        if len(parts) == 1:
+            return parts[0]
+        power, angle = (mixture.side_by_side(part) for part in zip(*parts, strict=True))
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:
@@ -82,12 +126,9 @@ class Kicks(nn.Module):
                 ],
                 1,
             )
-            vx, vy, cos, sin, gain = geometry_of(geometry, "ball_vx", "ball_vy", "cos", "sin", "kick_gain")
-            x, y = wanted[..., 0] - vx, wanted[..., 1] - vy
-            power = torch.sqrt(x.square() + y.square() + 1e-6) / gain.clamp(min=5e-3)
-            angle = torch.atan2(y * cos - x * sin, x * cos + y * sin)
+            power, angle = kick_for(wanted, geometry)
             return (
-                Mixture(logits, power.clamp(max=150.0), scale_of(power_scale, least=LEAST_POWER, typical=5.0)),
+                Mixture(logits, power, scale_of(power_scale, least=LEAST_POWER, typical=5.0)),
                 Mixture(logits, angle, scale_of(angle_scale, least=LEAST_ANGLE, typical=6 * DEGREE)),
             )
 

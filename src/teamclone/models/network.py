@@ -155,6 +155,7 @@ def _head(config: ModelConfig) -> PointHead | MixtureHead:
             kick_width=config.kick_hidden[-1] + config.kick_attention,
             target_width=config.kick_attention,
             kick_options=config.kick_options,
+            planned="plan" in config.kick_blocks,
             aims=config.aims,
             commands=config.commands,
         )

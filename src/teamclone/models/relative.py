@@ -29,6 +29,8 @@ from teamclone.models.physics import (
     tackle_failure,
 )
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
+from teamclone.planning.plan import CHOICES, PLAN, WAYS, WORTHS, plans
+from teamclone.planning.plan import FAR_M as WORTH_M
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import DEFAULTS, GROUPS
@@ -78,6 +80,11 @@ whether he keeps the goal. All 0 where he is not.
 """
 
 
+WAY = tuple(f"{name}_{what}" for name in WAYS for what in ("there", "vx", "vy"))
+"""Of each way to kick that a plan knows: whether there is one, and the velocity of the ball, metres per cycle."""
+SIDED = frozenset(f"{name}_vy" for name in WAYS)
+
+
 def geometry_of(geometry: Tensor, *names: str) -> list[Tensor]:
     """Columns of GEOMETRY, (batch, 1) each."""
     return [geometry[:, _PLACE[name], None] for name in names]
@@ -91,7 +98,12 @@ def mates_of(geometry: Tensor) -> Tensor:
 
 def others_of(geometry: Tensor) -> Tensor:
     """(batch, OTHERS, len(OTHER)) of features that have them."""
-    return geometry[:, len(GEOMETRY) :].reshape(-1, OTHERS, len(OTHER))
+    return geometry[:, len(GEOMETRY) : len(GEOMETRY) + OTHERS * len(OTHER)].reshape(-1, OTHERS, len(OTHER))
+
+
+def ways_of(geometry: Tensor) -> Tensor:
+    """(batch, len(WAYS), 3) of features with the block ``plan``: whether there is one, and the ball's velocity."""
+    return geometry[:, -len(WAY) :].reshape(-1, len(WAYS), 3)
 
 
 class RelativeFeatures(nn.Module):
@@ -122,6 +134,7 @@ class RelativeFeatures(nn.Module):
             *(f"{name}_{i}" for name in ("scene", *self.blocks) for i in range(parts[name].shape[1])),
             *GEOMETRY,
             *(f"other_{i}_{name}" for i in range(OTHERS if others else 0) for name in OTHER),
+            *(WAY if "plan" in self.blocks else ()),
         )
         self.n_inputs = self.names.index(GEOMETRY[0])
         self.normalisation = Normalisation(self.n_inputs)
@@ -132,6 +145,8 @@ class RelativeFeatures(nn.Module):
         state = _any(self.history)
         plain, mirrored = self.project(state), self.project(mirror_state(state, torch.arange(22)))
         turned = (plain + mirrored).abs().amax(0) < (plain - mirrored).abs().amax(0)
+        # In none of these has anybody the ball.
+        turned |= torch.tensor([name in SIDED for name in self.names])
         return torch.where(turned, -1.0, 1.0)
 
     def columns(self, blocks: tuple[str, ...]) -> list[int]:
@@ -143,7 +158,7 @@ class RelativeFeatures(nn.Module):
     def project(self, state: State) -> Tensor:
         """(batch, len(names)) before normalisation."""
         parts = self._parts(state)
-        after = ("geometry", "others") if self.others else ("geometry",)
+        after = (*("geometry",), *(("others",) if self.others else ()), *(("ways",) if "plan" in self.blocks else ()))
         return torch.cat([parts[name] for name in ("scene", *self.blocks, *after)], dim=1)
 
     def fit(self, chunks: Iterable[Tensor]) -> None:
@@ -284,6 +299,8 @@ class RelativeFeatures(nn.Module):
         parts["rivals"] = _nearest(others, to_ball, opponent, RIVALS)
         if self.others:
             parts["others"] = _all_others(players, to_me, mate, opponent)
+        if "plan" in self.blocks:
+            parts["plan"], parts["ways"] = _plan(state)
         if self.history:
             parts["past"] = _past(state, me, view, frames=self.history)
 
@@ -390,6 +407,20 @@ def _last(players: Tensor, actor: Tensor) -> Tensor:
     own = functional.one_hot(_of(kinds, actor), CommandKind.MOVE + 1).to(players.dtype)
     kicked = (kinds == CommandKind.KICK).to(players.dtype).scatter(1, actor[:, None], 0.0)
     return torch.cat([own, kicked[:, :11].amax(1, keepdim=True), kicked[:, 11:].amax(1, keepdim=True)], 1)
+
+
+def _plan(state: State) -> tuple[Tensor, Tensor]:
+    """What is planned with the ball, (batch, columns), and WAY; zeros for who cannot kick it."""
+    made = plans(state)
+    column = {name: made[:, index, None] for index, name in enumerate(PLAN)}
+    worths = torch.cat([column[f"{name}_worth"] for name in WORTHS], 1)
+    seen = [
+        column["able"],
+        *(column[f"choose_{name}"] for name in CHOICES),
+        *(column[f"{name}_there"] for name in WAYS),
+    ]
+    seen += [worths / WORTH_M, worths.clamp(-1.0, 1.0), column["pass_kicks"] / 3, column["pass_cycles"] / 20]
+    return torch.cat(seen, 1), torch.cat([column[name] for name in WAY], 1)
 
 
 def _ball(ball: Tensor, view: _View, motion: Tensor, *, areas: Tensor) -> Tensor:

@@ -17,7 +17,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from teamclone.dataset.layout import CODE, DETAIL, MISSING, NO_CODE, Split
+from teamclone.dataset.layout import Split
 from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
@@ -112,7 +112,7 @@ def train(
         model = Clone(config.model).to(device)
         optimiser = optimiser_of(config.train, model, precision=precision)
         for split_rows in (rows, validation_rows):
-            _check_whole(model, dataset, split_rows)
+            dataset.need(model.inputs.channels, split_rows)
         feed = Feed(
             dataset,
             model,
@@ -362,26 +362,6 @@ def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
         return rows
     chosen = np.random.default_rng((config.train.seed, 2)).choice(len(rows), wanted, replace=False)
     return rows[np.sort(chosen)]
-
-
-def _check_whole(model: Clone, dataset: Dataset, rows: NDArray[np.int64]) -> None:
-    """See that the frames of these samples hold every value that the inputs need."""
-    frames = np.unique(dataset.samples["frame"].numpy()[rows])
-    needed = model.inputs.channels
-    for start in range(0, len(frames), GATHER_ROWS):
-        part = frames[start : start + GATHER_ROWS]
-        ball = dataset.frames["ball"].numpy()[part]
-        detail, code = (dataset.frames[name].numpy()[part] for name in ("detail", "code"))
-        lacking = {f"ball_{name}": np.isnan(ball[:, index]) for index, name in enumerate(("x", "y", "vx", "vy"))}
-        lacking |= {name: (detail[..., DETAIL[name]] == MISSING).any(1) for name in needed if name in DETAIL}
-        lacking |= {name: (code[..., CODE[name]] == NO_CODE).any(1) for name in needed if name in CODE}
-        for name, column in lacking.items():
-            if column.any():
-                match = dataset.matches[int(dataset.frames["match"][part[column][0]])]
-                raise DatasetError(
-                    f"{dataset.path}: match {match['match_id']} has no {name} in its log, which the model needs; "
-                    "make the dataset without it"
-                )
 
 
 def learning_rate(config: TrainConfig, *, epoch: int, batch: int, batches: int) -> float:

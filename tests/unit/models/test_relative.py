@@ -18,13 +18,24 @@ from teamclone.dataset.layout import (
 )
 from teamclone.models.config import BLOCKS
 from teamclone.models.mirror import mirror_state
-from teamclone.models.relative import CLIP, GEOMETRY, MATES, NEAREST_OPPONENTS, PAST_FRAMES, RIVALS, RelativeFeatures
+from teamclone.models.relative import (
+    CLIP,
+    GEOMETRY,
+    MATES,
+    NEAREST_OPPONENTS,
+    PAST_FRAMES,
+    RIVALS,
+    WAY,
+    RelativeFeatures,
+)
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
 
-PARTS = ("scene", *BLOCKS, "geometry")
-FEATURES = RelativeFeatures()
+SEEN = tuple(block for block in BLOCKS if block != "plan")
+"""All but what is planned, which has tests of its own."""
+PARTS = ("scene", *SEEN, "geometry")
+FEATURES = RelativeFeatures(SEEN)
 PLAYER = 11
 """Columns of one player in mates, opponents and rivals."""
 
@@ -61,7 +72,7 @@ def test_names_are_the_columns_and_unique() -> None:
         projected = features.project(situations(3, history=features.history))
         assert projected.shape == (3, len(features.names))
         assert len(set(features.names)) == len(features.names)
-        assert features.names[features.n_inputs :] == GEOMETRY
+        assert features.names[features.n_inputs :] == (*GEOMETRY, *(WAY if "plan" in blocks else ()))
         assert {name.rpartition("_")[0] for name in features.names[: features.n_inputs]} == {"scene", *blocks}
 
 

@@ -1,0 +1,340 @@
+"""Going on with the ball: a few dashes with it just ahead, a long run after it, or on without a kick."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from teamclone.models.physics import NEAR_M
+from teamclone.planning.bodies import (
+    AREA,
+    BALL,
+    BALL_DECAY,
+    BALL_PUSH_MAX,
+    BALL_RAND,
+    BALL_SPEED_MAX,
+    BODY,
+    CAPACITY,
+    CATCH_M,
+    DASH_RATE,
+    DECAY,
+    EXTRA,
+    GAIN,
+    GOAL_X,
+    HARDLY,
+    INERTIA,
+    KEEPER,
+    LEAST_MARGIN_DEG,
+    MARGIN,
+    ME,
+    OPPONENT,
+    PLAYER_RAND,
+    PUSH,
+    SIZE,
+    TACKLING,
+    TOP,
+    VX,
+    VY,
+    Array,
+    X,
+    Y,
+    coasted,
+    dashes,
+    direction,
+    fastest,
+    in_their_box,
+    kernel,
+    rolled,
+    speed_over,
+    steps,
+    turned,
+)
+from teamclone.planning.passes import TACKLED_CYCLES
+from teamclone.planning.stamina import FORCE, LEFT, LOW, push_of, rest, spare, tired
+from teamclone.planning.worth import worth
+from teamclone.rcss import pitch
+
+TURNS, DASHES, AHEAD = 16, (2, 4), 0.2
+"""Directions of a dribble around the body, its dashes, and the part of the margin by which the ball is then ahead."""
+FACED_DEG, MOST_TURNS = 10.0, 2
+OWN_GOAL_X, OWN_GOAL_Y, BACK_X, WIDEST_DEG = -36.0, 20.0, 16.0, (45.0, 100.0)
+"""Near the own goal, and behind an x, dribbles go no further round from +x than this."""
+DRIBBLE_RESERVE, RUN_RESERVE = 300.0, 350.0
+"""Stamina that is left beyond what lets recovery fall."""
+SEEN_M = 20.0
+"""Opponents further away do not hinder a dribble."""
+PAST_M = -4.0
+"""Nor do those so far behind the ball."""
+OFF_M = 0.1
+"""A ball is kicked past himself by so much at least."""
+RUN_STEP_DEG, RUNS, LEAST_RUN = 6.0, 60, 5
+RUN_X, RUN_DASHES = (-20.0, 0.0, 10.0, 20.0), (6, 7, 13, 15, 20)
+"""Most dashes of a run where the ball's x is less than each, and beyond."""
+RUN_FORWARD_X, RUN_WIDEST_DEG = 41.0, 85.0
+RUN_INSIDE_M = 2.5, 3.0
+OWN_GOAL_M = 18.0
+STRIDE_DASHES = 10
+"""Runs with more dashes come in steps of two."""
+ON_DASHES, ON_INSIDE_M, LEAST_PUSH, PUSH_STEP = 20, 0.5, 0.3, 0.05
+VALUE, TO_X, TO_Y, SPEED, DIRECTION, TURNS_FIRST, CYCLES = range(7)
+"""Columns of what is found."""
+
+
+@kernel
+def _none() -> Array:
+    found = np.zeros(7)
+    found[VALUE] = -np.inf
+    return found
+
+
+@kernel
+def _hindered(scene: Array, x: float, y: float, cycles: int) -> bool:
+    """Whether an opponent has the ball at the end of a dribble."""
+    me, ball = scene[ME], scene[BALL]
+    angle = math.radians(direction(x - ball[0], y - ball[1]))
+    cos, sin = math.cos(angle), math.sin(angle)
+    for opponent in range(OPPONENT, BALL):
+        player = scene[opponent]
+        if math.hypot(player[X] - me[X], player[Y] - me[Y]) > SEEN_M:
+            continue
+        if (player[X] - ball[0]) * cos + (player[Y] - ball[1]) * sin < PAST_M:
+            continue
+        reach = CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
+        from_x, from_y = coasted(player, cycles)
+        metres = math.hypot(x - from_x, y - from_y)
+        if metres - reach < HARDLY:
+            return True
+        needed = steps(player, (x - from_x, y - from_y), metres - 0.5 * reach - 0.2, reach)
+        spare = -TACKLED_CYCLES if player[TACKLING] > 0 else (x < 30.0) + (x < 0.0)
+        if needed - spare <= cycles:
+            return True
+    return False
+
+
+@kernel
+def best_dribble(scene: Array) -> Array:
+    """The free dribble that is worth most; VALUE is minus infinity where there is none."""
+    me, ball, gain = scene[ME], scene[BALL], scene[BALL, GAIN]
+    best = _none()
+    next_x, next_y = me[X] + me[VX], me[Y] + me[VY]
+    for turn in range(TURNS):
+        angle = turned(me[BODY] + 360.0 / TURNS * turn)
+        if me[X] < BACK_X and abs(angle) > WIDEST_DEG[1]:
+            continue
+        if me[X] < OWN_GOAL_X and abs(me[Y]) < OWN_GOAL_Y and abs(angle) > WIDEST_DEG[0]:
+            continue
+        left = abs(turned(360.0 / TURNS * turn))
+        speed = math.hypot(me[VX], me[VY]) * me[DECAY]
+        turns_first = 0
+        while left > FACED_DEG:
+            left = max(0.0, left - 180.0 / (1.0 + me[INERTIA] * speed))
+            speed *= me[DECAY]
+            turns_first += 1
+        if turns_first > MOST_TURNS:
+            continue
+        angle += -left if turn < TURNS // 2 else left
+        cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        x, y, vx, vy = next_x, next_y, me[VX] * me[DECAY], me[VY] * me[DECAY]
+        state = tired(me)
+        rest(me, state)
+        for _ in range(turns_first):
+            x, y, vx, vy = x + vx, y + vy, vx * me[DECAY], vy * me[DECAY]
+            rest(me, state)
+        for dash in range(1, DASHES[1] + 1):
+            push = push_of(me, state, min(max(0.0, state[LEFT] - LOW - DRIBBLE_RESERVE), 100.0))
+            vx, vy = vx + push * cos, vy + push * sin
+            x, y, vx, vy = x + vx, y + vy, vx * me[DECAY], vy * me[DECAY]
+            if dash < DASHES[0]:
+                continue
+            ahead = me[SIZE] + AHEAD * me[MARGIN]
+            to_x, to_y = x + ahead * cos, y + ahead * sin
+            if abs(to_x) > GOAL_X - 1.0 or abs(to_y) > pitch.HALF_WIDTH - 1.0:
+                continue
+            cycles = 1 + turns_first + dash
+            metres = math.hypot(to_x - ball[0], to_y - ball[1])
+            wanted = speed_over(metres, cycles)
+            ball_x, ball_y = wanted * (to_x - ball[0]) / metres, wanted * (to_y - ball[1]) / metres
+            push = math.hypot(ball_x - ball[2], ball_y - ball[3])
+            if push > min(100.0 * gain, BALL_PUSH_MAX) or wanted > BALL_SPEED_MAX:
+                continue
+            if math.hypot(ball[0] + ball_x - next_x, ball[1] + ball_y - next_y) < me[SIZE] + OFF_M:
+                continue
+            value = worth(scene, to_x, to_y, True)
+            if value <= best[VALUE] or _hindered(scene, to_x, to_y, cycles):
+                continue
+            best[VALUE], best[TO_X], best[TO_Y], best[SPEED] = value, to_x, to_y, wanted
+            best[DIRECTION], best[TURNS_FIRST], best[CYCLES] = direction(ball_x, ball_y), turns_first, cycles
+    return best
+
+
+@kernel
+def _overtaken(scene: Array, x: float, y: float, speed: float, cycles: int) -> bool:
+    """Whether an opponent has the ball of a run, in the next cycle or at its end."""
+    me, ball = scene[ME], scene[BALL]
+    angle = math.radians(direction(x - ball[0], y - ball[1]))
+    cos, sin = math.cos(angle), math.sin(angle)
+    next_x, next_y = ball[0] + speed * cos, ball[1] + speed * sin
+    for opponent in range(OPPONENT, BALL):
+        player = scene[opponent]
+        reach = CATCH_M if player[KEEPER] > 0 and in_their_box(next_x, next_y) else player[AREA]
+        at_x, at_y = player[X] + player[VX], player[Y] + player[VY]
+        if math.hypot(next_x - at_x, next_y - at_y) < reach + 0.1:
+            return True
+        body = math.radians(player[BODY])
+        push = player[PUSH]
+        if math.hypot(next_x - at_x - push * math.cos(body), next_y - at_y - push * math.sin(body)) < reach:
+            return True
+    for opponent in range(OPPONENT, BALL):
+        player = scene[opponent]
+        along = (player[X] - ball[0]) * cos + (player[Y] - ball[1]) * sin
+        if along < PAST_M:
+            continue
+        reach = CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
+        from_x, from_y = coasted(player, cycles)
+        metres = math.hypot(x - from_x, y - from_y)
+        if metres > scene[opponent, TOP] * cycles + reach:
+            continue
+        if metres - reach < HARDLY:
+            return True
+        left = metres - reach - 0.2 - 0.01 * math.hypot(player[X] - me[X], player[Y] - me[Y])
+        needed = steps(player, (x - from_x, y - from_y), left, reach)
+        spare = 0
+        if along > 0.8:
+            spare = 1 + (-TACKLED_CYCLES if player[TACKLING] > 0 else (x < 27.0))
+        if needed - spare <= cycles:
+            return True
+    return False
+
+
+@kernel
+def best_run(scene: Array) -> Array:
+    """The safe run that is worth most; VALUE is minus infinity where there is none."""
+    me, ball, gain = scene[ME], scene[BALL], scene[BALL, GAIN]
+    best = _none()
+    most = RUN_DASHES[0]
+    for part in range(len(RUN_X)):
+        if ball[0] >= RUN_X[part]:
+            most = RUN_DASHES[part + 1]
+    one_turn = 180.0 / (1.0 + me[INERTIA] * math.hypot(me[VX], me[VY]) * me[DECAY])
+    places = np.empty((most, 2))
+    for run in range(RUNS):
+        off = turned(RUN_STEP_DEG * run)
+        if abs(off) > one_turn:
+            continue
+        angle = turned(me[BODY] + off)
+        if ball[0] < RUN_FORWARD_X and abs(angle) > RUN_WIDEST_DEG:
+            continue
+        turns_first = 1 if run else 0
+        cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        x, y, vx, vy = me[X] + me[VX], me[Y] + me[VY], me[VX] * me[DECAY], me[VY] * me[DECAY]
+        state = tired(me)
+        rest(me, state)
+        if turns_first:
+            x, y, vx, vy = x + vx, y + vy, vx * me[DECAY], vy * me[DECAY]
+            rest(me, state)
+        count = 0
+        while count < most and (me[CAPACITY] <= 0 or state[LEFT] >= LOW + RUN_RESERVE):
+            kept = -me[EXTRA] if me[CAPACITY] <= 0 else LOW + RUN_RESERVE
+            push = push_of(me, state, min(100.0, state[LEFT] - kept))
+            vx, vy = vx + push * cos, vy + push * sin
+            x, y = x + vx, y + vy
+            if x > GOAL_X - RUN_INSIDE_M[0] or (abs(y) > pitch.HALF_WIDTH - RUN_INSIDE_M[1] and y * angle > 0):
+                break
+            vx, vy = vx * me[DECAY], vy * me[DECAY]
+            places[count, 0], places[count, 1] = x, y
+            count += 1
+        while count >= LEAST_RUN:
+            to_x, to_y = places[count - 1, 0], places[count - 1, 1]
+            cycles = 1 + turns_first + count
+            count -= 1 if count <= STRIDE_DASHES else 2
+            value = worth(scene, to_x, to_y, True)
+            if value <= best[VALUE] or math.hypot(to_x + GOAL_X, to_y) < OWN_GOAL_M:
+                continue
+            metres = math.hypot(to_x - ball[0], to_y - ball[1])
+            speed = speed_over(metres, cycles)
+            ball_x, ball_y = (to_x - ball[0]) / metres, (to_y - ball[1]) / metres
+            if fastest(ball_x, ball_y, gain, ball[2], ball[3]) < speed:
+                continue
+            off_x = ball[0] + speed * ball_x - me[X] - me[VX]
+            off_y = ball[1] + speed * ball_y - me[Y] - me[VY]
+            if math.hypot(off_x, off_y) < me[SIZE] + OFF_M:
+                continue
+            if _overtaken(scene, to_x, to_y, speed, cycles):
+                continue
+            best[VALUE], best[TO_X], best[TO_Y], best[SPEED] = value, to_x, to_y, speed
+            best[DIRECTION], best[TURNS_FIRST], best[CYCLES] = direction(ball_x, ball_y), turns_first, cycles
+    return best
+
+
+@kernel
+def opponents_first(scene: Array) -> int:
+    """Cycles until an opponent can have the ball, if nobody kicks it; `physics.reach_ball` has the same for all."""
+    ball = scene[BALL]
+    speed, angle = math.hypot(ball[2], ball[3]), math.atan2(ball[3], ball[2])
+    for cycle in range(ON_DASHES):
+        metres = rolled(speed, cycle)
+        x, y = ball[0] + metres * math.cos(angle), ball[1] + metres * math.sin(angle)
+        for opponent in range(OPPONENT, BALL):
+            player = scene[opponent]
+            from_x, from_y = coasted(player, cycle)
+            away = math.hypot(x - from_x, y - from_y)
+            if away <= player[AREA]:
+                return cycle
+            off = abs(turned(direction(x - from_x, y - from_y) - player[BODY]))
+            if away < NEAR_M and off > 90.0:
+                off = 180.0 - off
+            left = off - max(LEAST_MARGIN_DEG, math.degrees(math.asin(player[AREA] / away)))
+            count = 0
+            slower = math.hypot(player[VX], player[VY])
+            while left > 0 and count <= cycle:
+                left -= 180.0 / (1.0 + player[INERTIA] * slower)
+                slower *= player[DECAY]
+                count += 1
+            if count + dashes(player, away - player[AREA]) <= cycle:
+                return cycle
+    return ON_DASHES
+
+
+@kernel
+def best_going_on(scene: Array) -> Array:
+    """Dashes straight on that keep the ball in reach without a kick: where it then is, as far as is worth most."""
+    me, ball = scene[ME], scene[BALL]
+    best = _none()
+    cos, sin = math.cos(math.radians(me[BODY])), math.sin(math.radians(me[BODY]))
+    x, y, vx, vy = me[X], me[Y], me[VX], me[VY]
+    ball_x, ball_y, ball_vx, ball_vy = ball[0], ball[1], ball[2], ball[3]
+    state = tired(me)
+    for dash in range(1, min(ON_DASHES, opponents_first(scene) - 1) + 1):
+        ball_x, ball_y = ball_x + ball_vx, ball_y + ball_vy
+        if abs(ball_x) > GOAL_X - ON_INSIDE_M or abs(ball_y) > pitch.HALF_WIDTH - ON_INSIDE_M:
+            break
+        x, y = x + vx, y + vy
+        along = (ball_x - x) * cos + (ball_y - y) * sin
+        aside = (ball_y - y) * cos - (ball_x - x) * sin
+        if along < -me[AREA] or abs(aside) > me[AREA]:
+            break
+        doubt = min(0.1, math.hypot(x - me[X], y - me[Y]) * PLAYER_RAND)
+        doubt += min(0.1, math.hypot(ball_x - ball[0], ball_y - ball[1]) * BALL_RAND)
+        near, far = me[SIZE] + 0.2 - 0.1 * dash, me[AREA] - doubt - 0.15
+        rate = me[DASH_RATE] * state[FORCE]
+        most = rate * min(100.0, spare(me, state, 1.0))
+        push = most
+        least = min(LEAST_PUSH, most - 0.001)
+        done = False
+        while push > least:
+            away = math.hypot(along - push, aside)
+            if near < away < far:
+                done = True
+                break
+            push -= PUSH_STEP
+        if not done:
+            break
+        x, y, vx, vy = x + push * cos, y + push * sin, vx + push * cos, vy + push * sin
+        vx, vy = vx * me[DECAY], vy * me[DECAY]
+        push_of(me, state, push / rate)
+        ball_vx, ball_vy = ball_vx * BALL_DECAY, ball_vy * BALL_DECAY
+        value = worth(scene, ball_x, ball_y, True)
+        if value > best[VALUE]:
+            best[VALUE], best[TO_X], best[TO_Y], best[CYCLES] = value, ball_x, ball_y, dash
+    return best

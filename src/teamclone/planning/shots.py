@@ -1,0 +1,145 @@
+"""Shots: to which of some places in the goal, and how hard."""
+
+from __future__ import annotations
+
+import math
+
+from teamclone.planning.bodies import (
+    AREA,
+    BALL,
+    BALL_DECAY,
+    BALL_SPEED_MAX,
+    CATCH_M,
+    GAIN,
+    GOAL_X,
+    GOAL_Y,
+    HARDLY,
+    KEEPER,
+    ME,
+    OPPONENT,
+    PENALTY_X,
+    PENALTY_Y,
+    TACKLING,
+    TOP,
+    Array,
+    X,
+    Y,
+    coasted,
+    cycles_over,
+    direction,
+    fastest,
+    in_their_box,
+    kernel,
+    rolled,
+    steps,
+    turned,
+)
+from teamclone.planning.passes import BEHIND_M
+
+FROM_M = 30.0
+PLACES, FASTER = 25, 0.3
+"""In the goal, and the step in which speeds are tried."""
+INSIDE_M, INSIDE_EACH_M, INSIDE_MOST_M = 0.6, 0.042, 1.5
+"""How far within the posts: at least, per metre of distance, at most."""
+SLOWEST, PAST_M = 1.5, 5.0
+"""Speed of a shot at least, and how far behind the line it would roll."""
+FAR_M, WIDE_Y = 8.0, 4.0
+"""Of a ball so far away shots so far from the middle are worth less."""
+KEEPER_LATE_DEG, KEEPER_DEG = 1.0, 10.0
+"""Shots so near to the keeper are worth less: if he is too late for them, and else."""
+SEEN_X = PENALTY_X - 30.0
+SEEN_NOISE = 0.02
+"""Of a keeper's distance: by how much nearer he may be."""
+
+
+@kernel
+def _saved(scene: Array, angle: float, speed: float, last: int) -> int:
+    """Whether an opponent has a shot before the goal, -1; else 1 if the keeper is too late for it, and 2 more if all
+    others are by far."""
+    me, ball = scene[ME], scene[BALL]
+    keeper_late, others_late = True, True
+    cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    for opponent in range(OPPONENT, BALL):
+        player = scene[opponent]
+        if player[TACKLING] > 0 or player[X] < SEEN_X or abs(player[Y]) > PENALTY_Y:
+            continue
+        if abs(turned(angle - direction(player[X] - me[X], player[Y] - me[Y]))) > 90.0:
+            continue
+        away_x, away_y = player[X] - ball[0], player[Y] - ball[1]
+        if away_x * cos + away_y * sin < BEHIND_M:
+            continue
+        first = max(1, int(abs(away_y * cos - away_x * sin) / scene[opponent, TOP]))
+        for cycle in range(first, last):
+            way_m = rolled(speed, cycle)
+            x, y = ball[0] + way_m * cos, ball[1] + way_m * sin
+            from_x, from_y = coasted(player, cycle)
+            metres = math.hypot(x - from_x, y - from_y)
+            if player[KEEPER] > 0:
+                if x > GOAL_X:
+                    break
+                box = in_their_box(x, y)
+                reach = CATCH_M if box else player[AREA]
+                if box:
+                    metres -= SEEN_NOISE * math.hypot(player[X] - me[X], player[Y] - me[Y])
+                if metres - reach - 0.15 < HARDLY:
+                    return -1
+                left = (metres - 0.9 * reach) * 0.999 if cycle > 1 else metres
+                needed = steps(player, (x - from_x, y - from_y), left, reach + 0.1)
+                if needed <= (cycle if box else cycle - 2):
+                    return -1
+                if box and needed <= cycle + 1:
+                    keeper_late = False
+            else:
+                if metres - player[AREA] < HARDLY:
+                    return -1
+                left = metres - 0.8 * player[AREA] if cycle > 1 else metres
+                needed = steps(player, (x - from_x, y - from_y), left, player[AREA])
+                if needed <= cycle - 1:
+                    return -1
+                if needed <= cycle + 1:
+                    others_late = False
+    return keeper_late + 2 * others_late
+
+
+@kernel
+def best_shot(scene: Array) -> tuple[float, float, float, float]:
+    """Where to and how fast, and the speed that one kick gives; a speed of 0 where there is no shot."""
+    me, ball = scene[ME], scene[BALL]
+    if math.hypot(GOAL_X - me[X], me[Y]) > FROM_M:
+        return 0.0, 0.0, 0.0, 0.0
+    goal_x, low, high = GOAL_X, -GOAL_Y, GOAL_Y
+    low += min(INSIDE_MOST_M, INSIDE_M + INSIDE_EACH_M * math.hypot(goal_x - ball[0], low - ball[1]))
+    high -= min(INSIDE_MOST_M, INSIDE_M + INSIDE_EACH_M * math.hypot(goal_x - ball[0], high - ball[1]))
+    if me[X] > GOAL_X - 1.0 and abs(me[Y]) < GOAL_Y:
+        goal_x = me[X] + 1.5
+    keeper_at = 0.0
+    keeper = -1
+    for opponent in range(OPPONENT, BALL):
+        if scene[opponent, KEEPER] > 0:
+            keeper = opponent
+            keeper_at = direction(scene[opponent, X] - ball[0], scene[opponent, Y] - ball[1])
+    best, best_y, best_speed, best_one = 0.0, 0.0, 0.0, 0.0
+    for place in range(PLACES):
+        y = low + (high - low) / (PLACES - 1) * place
+        metres = math.hypot(goal_x - ball[0], y - ball[1])
+        angle = direction(goal_x - ball[0], y - ball[1])
+        one = fastest((goal_x - ball[0]) / metres, (y - ball[1]) / metres, scene[BALL, GAIN], ball[2], ball[3])
+        speed = max((metres + PAST_M) * (1.0 - BALL_DECAY), one, SLOWEST)
+        last = False
+        while not last:
+            if speed > BALL_SPEED_MAX - 0.001:
+                speed, last = BALL_SPEED_MAX, True
+            cycles = cycles_over(metres, speed)
+            late = 3 if cycles <= 1 else _saved(scene, angle, speed, cycles)
+            if late >= 0:
+                value = 1.0 + 50.0 * (speed <= one + 0.001) + 100.0 * (late & 1) + 100.0 * (late >> 1)
+                if keeper >= 0:
+                    width = KEEPER_LATE_DEG if late & 1 else KEEPER_DEG
+                    value *= 1.0 - math.exp(-0.5 * (turned(angle - keeper_at) / width) ** 2)
+                if metres > FAR_M:
+                    value *= math.exp(-0.5 * (max(0.0, abs(y) - WIDE_Y) / (GOAL_Y - INSIDE_MOST_M)) ** 2)
+                if value > best:
+                    best, best_y, best_speed, best_one = value, y, speed, one
+                last |= late == 3
+            speed += FASTER
+    return goal_x, best_y, best_speed, best_one

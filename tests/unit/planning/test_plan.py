@@ -1,0 +1,280 @@
+"""Plans with the ball: single ones played out by the server's rules, and those of agents in real matches."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from situations import put, resting, situations
+from teamclone.dataset.build import DatasetConfig, build_dataset
+from teamclone.dataset.layout import FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING
+from teamclone.dataset.reader import open_dataset
+from teamclone.models.mirror import mirror_state
+from teamclone.models.physics import kick_rate, radians
+from teamclone.models.state import CHANNEL, State
+from teamclone.planning.kicking import COUNTS, PLACES, paths
+from teamclone.planning.plan import CHOICES, NEAR_BALL_M, PLAN, WAYS, WORTHS, plans
+from teamclone.rcss.commands import CLONED_KINDS, CommandKind
+from teamclone.store import create_store
+from teamclone.store.ingest import ingest
+
+AREA, EDGES, MARGIN = 1.085, 0.385, 0.7
+"""Of the default type, with whom all made situations are."""
+
+
+def scene(
+    *, x: float = 0.0, y: float = 0.0, body: float = 0.0, ball: tuple[float, ...] = (0.6, 0.0, 0.0, 0.0)
+) -> State:
+    """Player 0 alone on the pitch with the ball at a place seen from him, and its velocity."""
+    state = resting()
+    put(state, 0, x=x, y=y, body=body)
+    state.ball[0] = torch.tensor(ball) + torch.tensor([x, y, 0.0, 0.0])
+    return state
+
+
+def planned(state: State) -> dict[str, float]:
+    return dict(zip(PLAN, plans(state)[0].tolist(), strict=True))
+
+
+def choice(state: State) -> str:
+    made = planned(state)
+    chosen = [name for name in CHOICES if made[f"choose_{name}"]]
+    assert len(chosen) == 1
+    return chosen[0]
+
+
+def velocity(state: State, way: str) -> tuple[float, float]:
+    made = planned(state)
+    assert made[f"{way}_there"]
+    return made[f"{way}_vx"], made[f"{way}_vy"]
+
+
+def rolled(state: State, way: str, cycles: int) -> tuple[float, float]:
+    """Where the ball is so many cycles after a kick."""
+    metres = (1 - 0.94**cycles) / (1 - 0.94)
+    vx, vy = velocity(state, way)
+    return float(state.ball[0, 0]) + vx * metres, float(state.ball[0, 1]) + vy * metres
+
+
+def dashed(count: int) -> float:
+    """Metres of dashes at full power from rest."""
+    speed = covered = 0.0
+    for _ in range(count):
+        speed += 0.6
+        covered += speed
+        speed *= 0.4
+    return covered
+
+
+def test_who_cannot_kick_plans_nothing() -> None:
+    state = situations(300, seed=5)
+    made = plans(state)
+    me = state.players[torch.arange(300), state.actor]
+    away = (me[:, :2] - state.ball[:, :2]).norm(dim=1)
+    able = made[:, 0] > 0
+    assert 20 < int(able.sum()) < 150
+    assert (away[able] <= AREA + 0.1).all()
+    assert (made[~able] == 0).all()
+    assert (made[able][:, 1 : 1 + len(CHOICES)].sum(1) == 1).all()
+    assert torch.isfinite(made).all()
+    # One at a time they are the same.
+    one = State(*(part[able][:1] for part in state))
+    assert torch.equal(plans(one), made[able][:1])
+    assert plans(State(*(part[:0] for part in state))).shape == (0, len(PLAN))
+    assert NEAR_BALL_M > AREA + 0.1
+
+
+def test_alone_he_runs() -> None:
+    """20 dashes after the kick, if he is far enough up, to where he then is; in his own half only seven."""
+    state = scene(x=21.0)
+    assert choice(state) == "run"
+    assert rolled(state, "run", 21) == pytest.approx((21.0 + dashed(20), 0.0), abs=1e-3)
+    # The ball starts half a metre ahead of him: it has to be passed.
+    back = scene(x=-10.5)
+    assert rolled(back, "run", 8) == pytest.approx((-10.5 + dashed(7), 0.0), abs=1e-3)
+    assert planned(back)["dribble_worth"] < 0 < planned(back)["run_worth"]
+
+
+def test_who_is_tired_runs_less() -> None:
+    """2750 are kept; who has nothing left at all runs on what is extra, at half power, but does not dribble."""
+    state = scene(x=-10.5)
+    put(state, 0, stamina=2600.0)
+    assert not planned(state)["run_there"]
+    put(state, 0, stamina=0.0, capacity=0.0)
+    assert planned(state)["run_there"]
+    ahead = EDGES + 0.2 * MARGIN
+    assert rolled(state, "dribble", 3) == pytest.approx((-10.5 + ahead, 0.0), abs=1e-3)
+
+
+def test_a_dribble_has_the_ball_just_ahead() -> None:
+    """Someone stands in the way of runs, at 6 m: two to four dashes, as many as he does not hinder."""
+    state = scene()
+    put(state, 11, x=7.0, y=0.0, body=90.0)
+    made = planned(state)
+    assert not made["run_there"] or made["run_vy"] != 0
+    ends = [rolled(state, "dribble", 1 + count) for count in (2, 3, 4)]
+    ahead = EDGES + 0.2 * MARGIN
+    straight = [end for end, count in zip(ends, (2, 3, 4), strict=True) if abs(end[0] - dashed(count) - ahead) < 1e-3]
+    assert made["dribble_vy"] != 0 or len(straight) == 1
+
+
+def test_a_pass_meets_a_team_mate_before_opponents() -> None:
+    """Where he can be by then; one who stands in its way cuts it off, and another is played."""
+    state = scene(x=-12.0)
+    put(state, 1, x=-6.0, y=3.0)  # in his half: no pass far ahead of him
+    put(state, 11, x=40.0, y=0.0, flags=FLAG_GOALIE)
+    put(state, 12, x=38.0, y=20.0, body=180.0)
+    made = planned(state)
+    assert made["pass_kicks"] == 1
+    to_x, to_y = rolled(state, "pass", int(made["pass_cycles"]))
+    assert dashed(int(made["pass_cycles"])) > math.hypot(to_x + 6.0, to_y - 3.0)
+    assert to_x > -6.0
+    put(state, 13, x=(to_x - 11.4) / 2, y=to_y / 2, body=180.0)
+    other = planned(state)
+    assert (other["pass_vx"], other["pass_vy"]) != (made["pass_vx"], made["pass_vy"])
+    assert other["pass_worth"] < made["pass_worth"]
+
+
+def test_no_pass_to_who_is_offside_or_not_there() -> None:
+    state = scene(x=0.0)
+    put(state, 1, x=20.0, y=5.0)
+    put(state, 11, x=45.0, y=0.0, flags=FLAG_GOALIE)
+    put(state, 12, x=10.0, y=20.0)
+    assert not planned(state)["pass_there"]
+    put(state, 12, x=25.0, y=20.0)
+    assert planned(state)["pass_there"]
+    state.players[:, 1, CHANNEL["flags"]] = FLAG_ON_FIELD | FLAG_TACKLING
+    assert not planned(state)["pass_there"]
+
+
+def test_a_free_goal_is_shot_at() -> None:
+    state = scene(x=42.0, y=1.0)
+    assert choice(state) == "shot"
+    vx, vy = velocity(state, "shot")
+    assert abs(1.0 + (52.5 - 42.6) * vy / vx) < 7.01 - 0.6
+    far = scene(x=20.0)
+    assert not planned(far)["shot_there"]
+
+
+def test_who_is_challenged_clears() -> None:
+    """Towards the goal; from the side of the goal line before it."""
+    state = scene(x=-10.0)
+    put(state, 11, x=-8.6, y=0.0, body=180.0)
+    assert choice(state) == "clear"
+    vx, vy = velocity(state, "clear")
+    assert math.hypot(vx, vy) == pytest.approx(100 * 0.027 * (1 - 0.25 * (0.6 - EDGES) / MARGIN), abs=1e-3)
+    assert vy == pytest.approx(0.0, abs=1e-6)
+    side = scene(x=40.0, y=15.0)
+    put(side, 11, x=41.4, y=15.0)
+    vx, vy = velocity(side, "clear")
+    assert vy / vx == pytest.approx(-15.0 / (45.0 - 40.6), abs=1e-3)
+    # Who tackles is no challenge.
+    state.players[:, 11, CHANNEL["flags"]] = FLAG_ON_FIELD | FLAG_TACKLING
+    assert choice(state) != "clear"
+
+
+def test_who_faces_back_turns_if_nobody_is_near() -> None:
+    state = scene(body=180.0, ball=(-0.5, 0.0, 0.0, 0.0))
+    assert choice(state) == "turn"
+    put(state, 11, x=-3.0, y=1.0)
+    assert choice(state) != "turn"
+
+
+def test_a_nearer_team_mate_has_it() -> None:
+    state = scene()
+    put(state, 1, x=1.0, y=0.0)
+    assert choice(state) == "leave"
+    put(state, 1, x=1.5, y=0.0)
+    assert choice(state) != "leave"
+
+
+def test_a_ball_that_is_held_stays_in_reach() -> None:
+    """Surrounded, he brings it to where it is least in reach of them."""
+    state = scene(x=-30.0, y=10.0, ball=(0.2, 0.35, 0.0, 0.0))
+    for opponent, degrees in enumerate(range(0, 360, 45), 11):
+        angle = math.radians(degrees)
+        put(state, opponent, x=-30 + 1.65 * math.cos(angle), y=10 + 1.65 * math.sin(angle), body=float(degrees + 180))
+    made = planned(state)
+    assert made["hold_there"]
+    assert choice(state) == "hold"
+    x, y = rolled(state, "hold", 1)
+    off = math.hypot(x + 30, y - 10)
+    assert any(off == pytest.approx(EDGES + part * MARGIN, abs=1e-3) for part in (0.4, 0.6, 0.75))
+
+
+def test_what_is_too_much_for_one_kick_is_prepared() -> None:
+    """A hard pass from a ball that lies behind him: the first kick brings it to one of the places beside him."""
+    state = scene(x=10.0, ball=(-0.9, 0.2, 0.0, 0.0))
+    put(state, 1, x=30.0, y=8.0)
+    for opponent, (x, y) in enumerate(((40.0, 0.0), (36.0, 20.0)), 11):
+        put(state, opponent, x=x, y=y, body=180.0)
+    made = planned(state)
+    assert made["pass_kicks"] > 1
+    x, y = rolled(state, "pass", 1)
+    off = math.hypot(x - 10.0, y)
+    assert any(off == pytest.approx(EDGES + part * MARGIN, abs=1e-3) for part in (0.3, 0.5, 0.7))
+
+
+def test_paths_of_several_kicks() -> None:
+    """Straight ahead those give most speed that end behind and come from ahead."""
+    order = paths()
+    assert order.min() == 0
+    assert order.max() == PLACES - 1 == sum(COUNTS) - 1
+    assert (np.unique(order.reshape(-1, 2), axis=0).shape[0]) > 1024
+    near = {tuple(pair) for pair in order[36, :10].tolist()}
+    assert len(near) == 10
+
+
+def test_a_mirrored_plan_is_the_plan_mirrored() -> None:
+    """Mostly: agents go round the places beside a team mate one way, and stop at the first that is another's."""
+    state = situations(900, seed=11)
+    made, turned = plans(state), plans(mirror_state(state, torch.arange(22)))
+    sided = torch.tensor([-1.0 if name.endswith("_vy") else 1.0 for name in PLAN])
+    able = made[:, 0] > 0
+    assert torch.equal(able, turned[:, 0] > 0)
+    alike = torch.isclose(made[able] * sided, turned[able], atol=1e-3).all(1)
+    assert alike.float().mean() > 0.6
+
+
+def test_worths_tell_the_best() -> None:
+    state = situations(300, seed=7)
+    made = plans(state)
+    able = made[made[:, 0] > 0]
+    worths = able[:, [PLAN.index(f"{name}_worth") for name in WORTHS]]
+    # At most one is worth more than all others.
+    assert ((worths > 0).sum(1) <= 1).all()
+    assert worths.abs().max() <= 20
+    for way in ("pass", "dribble", "run"):
+        there, worth = able[:, PLAN.index(f"{way}_there")] > 0, able[:, PLAN.index(f"{way}_worth")]
+        if way != "pass":  # one that is best but for its kicks is not there
+            assert (worth[~there] == -20).all()
+
+
+def test_agents_of_real_matches_do_as_planned(samples_dir: Path, tmp_path: Path) -> None:
+    """HELIOS_base is HELIOS Base as it is; the log has four digits of each velocity."""
+    store = create_store(tmp_path / "store")
+    ingest([samples_dir], store)
+    build_dataset(DatasetConfig(teams=("HELIOS_base",)), store=store, out=tmp_path / "dataset")
+    data = open_dataset(tmp_path / "dataset")
+    target = data.target(range(len(data)))
+    rows = torch.nonzero(target.kind == CLONED_KINDS.index(CommandKind.KICK))[:, 0]
+    assert len(rows) > 100
+    state = data.state(rows.numpy())
+    made = plans(state)
+    me, types = (part[torch.arange(len(rows)), state.actor] for part in (state.players, state.types))
+    body = radians(me[:, CHANNEL["body"]])
+    gain = kick_rate(state.ball[:, :2] - me[:, :2], body, types)
+    power, direction = target.parameters[rows, 0], radians(target.parameters[rows, 1]) + body
+    given = state.ball[:, 2:] + (gain * power)[:, None] * torch.stack([torch.cos(direction), torch.sin(direction)], 1)
+    ways = made[:, PLAN.index("shot_vx") :].view(-1, len(WAYS), 2)
+    exact = (ways - given[:, None]).norm(dim=2) < 0.004
+    chosen = made[:, 1 : 1 + len(CHOICES)].argmax(1)
+    kicks = {**{name: index for index, name in enumerate(WAYS)}, "prepare": WAYS.index("pass")}
+    taken = torch.tensor([kicks.get(name, -1) for name in CHOICES])[chosen]
+    right = exact.gather(1, taken.clamp(min=0)[:, None])[:, 0] & (taken >= 0)
+    assert right.float().mean() > 0.8
+    assert exact.any(1).float().mean() > 0.85

@@ -46,13 +46,11 @@ from teamclone.evaluation.outcome import Outcome
 from teamclone.files import write_json
 from teamclone.machine import processor
 from teamclone.models.config import BLOCKS
-from teamclone.models.heads import MixtureHead
-from teamclone.models.kicks import COUNT
-from teamclone.models.network import Clone, parameter_count
-from teamclone.models.options import FAR_M, IMPOSSIBLE
-from teamclone.models.physics import kickable_area, reach_ball
-from teamclone.models.relative import RelativeFeatures, geometry_of
-from teamclone.models.state import CHANNEL, State, Target
+from teamclone.models.network import parameter_count
+from teamclone.models.physics import kick_rate, kickable_area, radians, reach_ball
+from teamclone.models.relative import RelativeFeatures
+from teamclone.models.state import CHANNEL, State
+from teamclone.planning.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
@@ -73,16 +71,21 @@ CHUNK = 16384
 SURE = 0.8
 """Confidence from which an error that all seeds make counts as systematic."""
 
+PLANLESS = (
+    "model.blocks=self,role,type,last,ball,reach,lines",
+    "model.kick_blocks=self,type,last,ball,reach,lines",
+)
+"""The preset's blocks without what is planned with the ball."""
 PLAIN = (
+    PLANLESS[0],
     "model.kick_blocks=self,type,last,ball,reach,lines,mates,opponents,rivals",
     "model.kick_attention=0",
-    "model.kick_options=false",
     "train.kicks=0",
     "train.optimiser=adam",
     "data.mirror=0.0",
 )
-"""Kicks without attention, samples as they are, Adam: what changes none of these is compared with these settings. The
-layers of the command share nothing with those of kicks, and these take a third of the time."""
+"""Nothing planned, kicks without attention, samples as they are, Adam: what changes none of these is compared with
+these settings, which take a third of the time."""
 TRAINING: dict[str, tuple[str, ...]] = {
     "adam": ("train.optimiser=adam",),
     "without-mirror": ("data.mirror=0.0",),
@@ -90,13 +93,13 @@ TRAINING: dict[str, tuple[str, ...]] = {
 """How the preset is trained: name and settings beside its own, in its full length; what keeps a network from learning
 its matches by heart pays in the last epochs only."""
 KICKS: dict[str, tuple[str, ...]] = {
-    "without-options": ("model.kick_options=false",),
-    "without-attention": PLAIN[1:3],
-    "lists": PLAIN[:3],
+    "without-plan": PLANLESS,
+    "plan-of-kicks": PLANLESS[:1],
+    "without-attention": ("model.kick_attention=0",),
     "without-kicks": ("train.kicks=0",),
 }
-"""What kicks may know of the other players and of what there is to choose from, and how often they are shown: name and
-settings beside the preset's."""
+"""What may be known of plans with the ball and of the other players, and how often kicks are shown: name and settings
+beside the preset's."""
 REMEDIES: dict[str, tuple[str, ...]] = {
     "oversample": ("train.balance=oversample", "train.balance_strength=0.5"),
     "undersample": ("train.balance=undersample", "train.balance_strength=0.5"),
@@ -155,7 +158,7 @@ def ablations() -> dict[str, tuple[str, ...]]:
             for name in ("blocks", "kick_blocks")
             if block in getattr(model, name)
         )
-    for block in ("view", "past"):
+    for block in ("view", "past", "plan"):
         if block not in model.blocks:
             found[f"with-{block}"] = (f"model.blocks={','.join((*model.blocks, block))}",)
     found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0.0")
@@ -528,35 +531,82 @@ class Work:
             }
             found["ensemble"] = self.figures(together)
         if is_run(self.out / "runs" / "best-0"):
-            found["kicks"] = self.kicks()
+            found["kicks"], found["choices"] = self.plans()
         return found
 
-    def kicks(self) -> dict[str, dict[str, Any]]:
-        """By set, of its kicks: how many are which of the options that agents have, and what `best-0` says of them."""
-        model = open_run(self.out / "runs" / "best-0").load_model().eval()
-        if not isinstance(model.head, MixtureHead) or model.head.kick.options is None:
-            return {}
-        found = {}
-        kinds = self.dataset.samples["kind"].numpy()[self.rows]
-        for name, mask in self.sets.items():
-            rows = self.rows[mask & (kinds == CLONED.index("kick"))]
-            with torch.inference_mode():
-                columns = model.features(self.dataset.state(rows, history=model.features.history))
-                given, likeliest = options_given(model, columns, self.dataset.target(rows))
-            by_kind = [given == kind for kind in range(len(OPTION_KINDS))]
-            found[name] = {
-                "kicks": len(rows),
-                "options": len(model.head.kick.options.kinds),
-                "share": [_share(kind) for kind in by_kind],
-                "likeliest": [_share(likeliest[kind]) for kind in by_kind[:OTHER_KICK]],
-                "likeliest_of_all": _share(likeliest[given < OTHER_KICK]),
+    def plans(self) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+        """By set, how many kicks are as planned, and of who can kick the ball, by what is planned, what he does.
+
+        Kicks are told by the velocity that they give the ball, to EXACT metres per cycle.
+        """
+        rows, made, given = self._with_ball()
+        kinds = self.dataset.samples["kind"].numpy()[rows]
+        kicked = kinds == CLONED.index("kick")
+        ways = made[:, PLAN.index("shot_vx") :].reshape(-1, len(WAYS), 2)
+        there = made[:, PLAN.index("shot_there") :][:, : len(WAYS)] > 0
+        exact = (np.hypot(*np.moveaxis(ways - given[:, None], 2, 0)) < EXACT) & there
+        choice = made[:, 1 : 1 + len(CHOICES)].argmax(1)
+        way = np.array([WAYS.index(KICK_OF[name]) if name in KICK_OF else 0 for name in CHOICES])[choice]
+        kicks = np.array([name in KICK_OF for name in CHOICES])[choice]
+        as_planned = kicked & kicks & exact[np.arange(len(rows)), way]
+        of_clone = self._kicks_of_clone(rows[kicked])
+        right = np.zeros(len(rows), np.bool_)
+        right[kicked] = np.hypot(*(of_clone - given[kicked]).T) < EXACT
+        member = {name: np.isin(rows, self.rows[mask]) for name, mask in self.sets.items()}
+        found = {
+            name: {
+                "kicks": int((mask & kicked).sum()),
+                "as_planned": _share(as_planned[mask & kicked]),
+                "among": _share(exact.any(1)[mask & kicked]),
+                "clone": _share(right[mask & kicked]),
             }
+            for name, mask in member.items()
+        }
+        choices = {}
+        for index, name in enumerate(CHOICES):
+            here = choice == index
+            other = here & kicked & ~as_planned
+            does = {"as_planned": as_planned & here, "other_kick": other}
+            does |= {kind: here & (kinds == CLONED.index(kind)) for kind in ("dash", "turn", "tackle")}
+            choices[name] = {"rows": int(here.sum()), **{what: _share(part[here]) for what, part in does.items()}}
+        return found, choices
+
+    def _with_ball(self) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
+        """Those of ``rows`` whose player can kick the ball, what is planned, (n, len(PLAN)), and the velocity that a
+        kick gives the ball, (n, 2)."""
+        rows, planned, given = [], [], []
+        for part in chunks(self.rows):
+            state, target = self.dataset.state(part), self.dataset.target(part)
+            made = plans(state)
+            able = torch.nonzero(made[:, 0] > 0).squeeze(1)
+            me, types = (of[able, state.actor[able]] for of in (state.players, state.types))
+            ball, body = state.ball[able], radians(me[:, CHANNEL["body"]])
+            gain = kick_rate(ball[:, :2] - me[:, :2], body, types)
+            power, direction = target.parameters[able].unbind(1)
+            added = torch.polar(gain * power, radians(direction) + body)
+            rows.append(part[able.numpy()])
+            planned.append(made[able].numpy())
+            given.append((ball[:, 2:] + torch.view_as_real(added)).numpy())
+        return np.concatenate(rows), np.concatenate(planned), np.concatenate(given)
+
+    def _kicks_of_clone(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(n, 2) velocity of the ball after the kicks that `best-0` says."""
+        model = open_run(self.out / "runs" / "best-0").load_model().eval()
+        state = self.dataset.state(rows, history=model.inputs.history)
+        outcome = predict(model, self.dataset, rows)
+        me, types = (of[torch.arange(len(rows)), state.actor] for of in (state.players, state.types))
+        body = radians(me[:, CHANNEL["body"]])
+        gain = kick_rate(state.ball[:, :2] - me[:, :2], body, types)
+        place = [PARAMETERS.index(item) for item in PARAMETERS if item.kind.name == "KICK"]
+        power, direction = torch.from_numpy(outcome.parameters[:, place]).unbind(1)
+        added = torch.polar(gain * power, radians(direction) + body)
+        found: NDArray[np.float32] = (state.ball[:, 2:] + torch.view_as_real(added)).numpy()
         return found
 
 
-def _share(of: torch.Tensor) -> float | None:
+def _share(of: NDArray[np.bool_]) -> float | None:
     """What part is true; None of nothing."""
-    return float(of.float().mean()) if len(of) else None
+    return float(of.mean()) if len(of) else None
 
 
 def _is_of(folder: Path, config: Config, data: Path) -> bool:
@@ -577,31 +627,8 @@ def chunks(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
     return (rows[start : start + CHUNK] for start in range(0, len(rows), CHUNK))
 
 
-OPTION_KINDS = ("to kick it on", "to keep it", "dribble", "run", "another")
-OTHER_KICK = len(OPTION_KINDS) - 1
-EXACT = 0.002
-"""Metres per cycle by which the velocity of the ball after a kick may miss that of an option; logs have four digits."""
-
-
-def options_given(model: Clone, columns: torch.Tensor, target: Target) -> tuple[torch.Tensor, torch.Tensor]:
-    """Which of OPTION_KINDS kicks are, and whether the very option is the one that a model with `Options` holds for the
-    likeliest of them, (n,) each.
-
-    Args:
-        columns: (n, columns) as of ``model.features``.
-    """
-    answers = model.answer(columns).kick
-    options, first = model.head.kick.options, COUNT
-    gain = geometry_of(columns[:, model.features.n_inputs :], "kick_gain")[0]
-    power, angle = answers[0].power.centre[:, first:], answers[0].direction.centre[:, first:]
-    given = torch.polar(gain[:, 0] * target.parameters[:, 0], torch.deg2rad(target.parameters[:, 1]))
-    missed = (torch.polar(gain * power, angle) - given[:, None]).abs()
-    # Options come in one order in both answers.
-    share = torch.stack([answer.power.logits.softmax(1)[:, first:] for answer in answers]).mean(0)
-    missed = torch.where(answers[0].power.logits[:, first:] > IMPOSSIBLE, missed, FAR_M)
-    away, nearest = missed.min(1)
-    kind = torch.where(away < EXACT, options.kinds[nearest], OTHER_KICK)
-    return kind, share.argmax(1) == nearest
+EXACT = 0.004
+"""Metres per cycle by which the velocity of the ball after a kick may miss what was planned; logs have four digits."""
 
 
 SITUATIONS = ("ball kickable", "first of his team to the ball", "off the ball")
@@ -768,7 +795,6 @@ def main() -> None:
         cleaning=work.dataset.meta["cleaning"],
         commands=[work.told(command) for command in (*work.commands, *map(work.training, there))],
         situations=SITUATIONS,
-        option_kinds=OPTION_KINDS,
         sure=SURE,
     )
     print(page)

@@ -76,7 +76,6 @@ def write(
     cleaning: Mapping[str, Any] | None,
     commands: Sequence[str],
     situations: Sequence[str],
-    option_kinds: Sequence[str],
     sure: float,
 ) -> None:
     """Write the page, and beside it the plot of the learning curve.
@@ -90,7 +89,7 @@ def write(
         parts += [_protocol(cleaning)]
     parts += [_goals(results), _spread(results), _numbers(results), _likelihood(results)]
     parts += [_variants("Training", TRAINING_TEXT, results, variants.get("t", {}), beside="best-0")]
-    parts += [_kicks(results, variants.get("k", {})), _options(left.get("kicks", {}), option_kinds)]
+    parts += [_kicks(results, variants.get("k", {})), _plans(left.get("kicks", {}), left.get("choices", {}))]
     parts += [_variants("What each part gains", ABLATIONS_TEXT, results, variants.get("d", {}))]
     parts += [_variants("Rare commands", REMEDIES_TEXT, results, variants.get("e", {}), rare=True)]
     curve = left.get("curve")
@@ -343,11 +342,11 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
     )
     return f"""## Kicks
 
-Where kicks go, and how hard, by what the layers of a kick know and by how often they see one. `short` is the preset
-`best` on the shorter schedule; `without-options` knows nothing of what agents choose between, nor do the others. In
-`without-attention` they know only the two nearest of each side to the ball, in `lists` the ten team mates, the six
-nearest opponents and the three nearest the ball, in a fixed order.
-`plain` is `lists` without kicks beside the batches, by Adam, on samples as they are.
+Where kicks go, and how hard, by what is known of plans with the ball, of the other players, and by how often kicks are
+shown. `short` is the preset `best` on the shorter schedule. `plan-of-kicks` tells what is planned to the layers of a
+kick alone, `without-plan` to none. In `without-attention` the layers of a kick know of the others only what is
+planned and the two nearest of each side to the ball. `plain` knows of no plan, and the other players as lists of the
+nearest; it is trained by Adam on samples as they are, without kicks beside the batches.
 
 {table(headers, rows)}"""
 
@@ -447,26 +446,30 @@ more matches alone would leave; from so few points it is a rough guess, as the f
 {table(headers, fits)}"""
 
 
-def _options(found: Mapping[str, Any], kinds: Sequence[str]) -> str:
-    """What kicks are, of step g."""
+def _plans(found: Mapping[str, Any], choices: Mapping[str, Any]) -> str:
+    """What is planned and what is done, of step g."""
     if not found:
         return ""
-    rows = [
-        [
-            name,
-            f"{row['kicks']:,}",
-            *(percent(share) for share in (*row["share"], row["likeliest_of_all"])),
-            " / ".join(percent(share) for share in row["likeliest"]),
-        ]
+    kicks = [
+        [name, f"{row['kicks']:,}", *(percent(row[key]) for key in ("as_planned", "among", "clone"))]
         for name, row in found.items()
     ]
-    headers = ("set", "kicks", *kinds, "likeliest option given", "the same by kind")
-    options = next(iter(found.values()))["options"]
-    return f"""Kicks that are one of the options of [`model.kick_options`](train.md#what-the-preset-best-trains), to two
-millimetres per cycle, by kind; and how often the very option, of {options}, is the one that `best-0` holds for the
-likeliest.
+    done = [
+        [name, f"{row['rows']:,}"]
+        + [percent(row[key]) for key in ("as_planned", "other_kick", "dash", "turn", "tackle")]
+        for name, row in choices.items()
+    ]
+    headers = ("set", "kicks", "as planned", "one of the ways planned", "as `best-0` says")
+    return f"""What [plans](train.md#what-the-preset-best-trains) by the rules of HELIOS Base say by themselves: kicks that
+give the ball the very velocity that was planned, to four millimetres per cycle; that of any way there was; and the one that
+`best-0` answers with.
 
-{table(headers, rows)}"""
+{table(headers, kicks)}
+
+Of all commands of those who can kick the ball, by what is planned, what was given. Who goes on with what he planned
+before dashes or turns; a log does not tell.
+
+{table(("planned", "commands", "kick as planned", "another kick", "dash", "turn", "tackle"), done)}"""
 
 
 def _left(left: Mapping[str, Any], results: Results, *, situations: Sequence[str], sure: float) -> str:

@@ -211,12 +211,11 @@ RELATIVE = (
 REMEDIES = (
     *RELATIVE,
     *("train.balance=oversample", "train.calibrate=true", "data.mirror=0.5"),
-    *("model.kick_attention=4", "model.kick_options=true", "model.kick_dropout=0.1", "train.kicks=8"),
+    *("model.kick_attention=4", "model.kick_blocks=ball,plan", "model.kick_dropout=0.1", "train.kicks=8"),
 )
 BASES: dict[str, Sequence[str]] = {
     "paper": (),
     "relative": RELATIVE,
-    "attentive": (*RELATIVE, "model.kick_attention=4"),
     "weights": ("train.balance=weights",),
 }
 CHANGES: dict[str, tuple[str, Sequence[str]]] = {
@@ -230,7 +229,6 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "model.parameter_hidden": ("relative", ["model.parameter_hidden=9"]),
     "model.kick_hidden": ("relative", ["model.kick_hidden=9"]),
     "model.kick_attention": ("relative", ["model.kick_attention=4"]),
-    "model.kick_options": ("attentive", ["model.kick_options=true"]),
     "model.kick_dropout": ("relative", ["model.kick_dropout=0.5"]),
     "model.hidden": ("paper", ["model.hidden=[17]"]),
     "model.activation": ("paper", ["model.activation=tanh"]),

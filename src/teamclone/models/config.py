@@ -38,8 +38,6 @@ class ModelConfig:
         kick_dropout: `dropout` of these, of which there are few examples.
         kick_attention: numbers by which each other player is known to these; see `crowd.Crowd`. A multiple of
             ATTENTION_HEADS; 0 for no such layers.
-        kick_options: whether these know what agents of the league choose between; see `options.Options`. Needs
-            `kick_attention`.
         hidden: widths of the hidden layers.
         activation: see `ACTIVATIONS`.
         dropout: share of the hidden units left out at random in training.
@@ -59,7 +57,6 @@ class ModelConfig:
     kick_hidden: tuple[int, ...] = ()
     kick_dropout: float = 0.0
     kick_attention: int = 0
-    kick_options: bool = False
     hidden: tuple[int, ...] = (512, 256, 128)
     activation: str = "relu"
     dropout: float = 0.0

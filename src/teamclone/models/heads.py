@@ -196,8 +196,8 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are, target_width: of what is known of each target. kick_options, planned: see `kicks.Kicks`. aims:
-            places of `aims.Aims`. commands: what it answers with.
+            kicks are, target_width: of what is known of each target. planned: see `kicks.Kicks`. aims: places of
+            `aims.Aims`. commands: what it answers with.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.
@@ -213,7 +213,6 @@ class MixtureHead(nn.Module):
         parameter_width: int,
         kick_width: int,
         target_width: int,
-        kick_options: bool,
         planned: bool,
         aims: int,
         commands: tuple[str, ...] = CLONED,
@@ -223,7 +222,7 @@ class MixtureHead(nn.Module):
         self.command = nn.Linear(width, len(commands))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
-        self.kick = Kicks(kick_width, target_width, options=kick_options, planned=planned)
+        self.kick = Kicks(kick_width, target_width, planned=planned)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))

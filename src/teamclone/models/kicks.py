@@ -13,7 +13,6 @@ from torch.nn import functional
 from teamclone.models import mixture
 from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
-from teamclone.models.options import IMPOSSIBLE, USUAL_ERROR, Options
 from teamclone.models.physics import covered
 from teamclone.models.relative import MATES, geometry_of, mates_of, ways_of
 from teamclone.planning.plan import WAYS
@@ -30,6 +29,10 @@ TOUCH_M = 3.0
 AHEAD_M = 0.6
 """Where a dribbler likes to have the ball."""
 COUNT = MATES + 1 + FREE + len(DRIBBLES)
+USUAL_ERROR = 0.003
+"""Metres per cycle by which the velocity of the ball misses what was planned, before training."""
+IMPOSSIBLE = -30.0
+"""Logit of a way that there is not."""
 
 
 def kick_for(wanted: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
@@ -77,18 +80,16 @@ class Kicks(nn.Module):
     Args:
         width: of what a kick is decided on.
         target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
-        options: add those of `options.Options`, which need a target width.
         planned: add those of `Planned`; the geometry ends in WAY then.
     """
 
     goal: Tensor
     cycles: Tensor
 
-    def __init__(self, width: int, target_width: int = 0, *, options: bool = False, planned: bool = False) -> None:
+    def __init__(self, width: int, target_width: int = 0, *, planned: bool = False) -> None:
         super().__init__()
         self.layer = nn.Linear(width, 6 * COUNT)
         self.target = nn.Linear(target_width, 6) if target_width else None
-        self.options = Options(width, target_width) if options else None
         self.planned = Planned(width) if planned else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
@@ -100,14 +101,10 @@ class Kicks(nn.Module):
             hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
             targets: (batch, TARGETS, target width), None for nothing.
         """
-        parts = [self._free(hidden, geometry, targets)]
-        if self.planned is not None:
-            parts.append(self.planned(hidden, geometry))
-        if self.options is not None and targets is not None:
-            parts.append(self.options(hidden, geometry, targets))
-        if len(parts) == 1:
-            return parts[0]
-        power, angle = (mixture.side_by_side(part) for part in zip(*parts, strict=True))
+        free = self._free(hidden, geometry, targets)
+        if self.planned is None:
+            return free
+        power, angle = (mixture.side_by_side(pair) for pair in zip(free, self.planned(hidden, geometry), strict=True))
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:

@@ -154,7 +154,6 @@ def _head(config: ModelConfig) -> PointHead | MixtureHead:
             parameter_width=config.parameter_hidden[-1],
             kick_width=config.kick_hidden[-1] + config.kick_attention,
             target_width=config.kick_attention,
-            kick_options=config.kick_options,
             planned="plan" in config.kick_blocks,
             aims=config.aims,
             commands=config.commands,

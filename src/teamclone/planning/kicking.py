@@ -83,9 +83,10 @@ def paths() -> NDArray[np.int64]:
             rate = 1 - 0.25 * abs(degrees) / 180.0 - 0.25 * (radius - size) / margin
             rates.append(DEFAULTS["kick_power_rate"] * rate)
 
-    def order(one: tuple[float, float, int, int], other: tuple[float, float, int, int]) -> float:
+    def order(one: tuple[float, float, int, int], other: tuple[float, float, int, int]) -> int:
         # Speeds that differ by less than this count as one, so this is no order that a key would give.
-        return one[1] - other[1] if abs(one[0] - other[0]) < 1e-3 else other[0] - one[0]
+        more = one[1] - other[1] if abs(one[0] - other[0]) < 1e-3 else other[0] - one[0]
+        return (more > 0) - (more < 0)
 
     made = np.empty((DIRECTIONS, PATHS, 2), np.int64)
     for turn in range(DIRECTIONS):

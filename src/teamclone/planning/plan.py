@@ -58,6 +58,8 @@ WAYS = ("shot", "clear", "pass", "dribble", "run", "hold")
 CHOICES = (*WAYS, "prepare", "turn", "dash", "leave")
 """What is taken: a way; the first kick of several; no kick but a turn or a dash; to leave it to a team mate who is
 nearer."""
+KICK_OF = {**{name: name for name in WAYS}, "prepare": "pass"}
+"""The way of each choice that kicks."""
 _SHOT, _CLEAR, _PASS, _DRIBBLE, _RUN, _HOLD, _PREPARE, _TURN, _DASH, _LEAVE = range(len(CHOICES))
 WORTHS = ("pass", "dribble", "run", "dash", "hold")
 """What is compared."""
@@ -258,15 +260,26 @@ _plan_all = _compiled()
 _order = cache(paths)
 
 
-def plans(state: State) -> Tensor:
-    """(batch, len(PLAN)) float32, on the device of the state; of who is far from the ball nothing is asked."""
-    each = torch.arange(len(state.actor), device=state.ball.device)
-    place = state.players[each, state.actor][:, [CHANNEL["x"], CHANNEL["y"]]]
-    near = torch.nonzero((state.ball[:, :2] - place).norm(dim=1) < NEAR_BALL_M).squeeze(1)
+@torch.library.custom_op("teamclone::plan", mutates_args=())
+def _plans(ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> Tensor:
+    """What `plans` does, as an operation of PyTorch: it can be a part of what is exported."""
+    each = torch.arange(len(actor), device=ball.device)
+    place = players[each, actor][:, [CHANNEL["x"], CHANNEL["y"]]]
+    near = torch.nonzero((ball[:, :2] - place).norm(dim=1) < NEAR_BALL_M).squeeze(1)
     made = np.zeros((len(near), len(PLAN)))
     if len(near):
-        ball, players, types, actors = (
-            part.index_select(0, near).cpu().numpy() for part in (state.ball, state.players, state.types, state.actor)
-        )
-        _plan_all(described(ball, players, types), actors, _order(), made)
-    return state.ball.new_zeros(len(each), len(PLAN)).index_copy(0, near, torch.from_numpy(made).to(state.ball))
+        parts = (part.index_select(0, near).cpu().numpy() for part in (ball, players, types, actor))
+        near_ball, near_players, near_types, actors = parts
+        _plan_all(described(near_ball, near_players, near_types), actors, _order(), made)
+    return ball.new_zeros(len(each), len(PLAN)).index_copy(0, near, torch.from_numpy(made).to(ball))
+
+
+@_plans.register_fake
+def _(ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> Tensor:
+    return ball.new_empty(ball.shape[0], len(PLAN))
+
+
+def plans(state: State) -> Tensor:
+    """(batch, len(PLAN)), on the device of the state and of its type; of who is far from the ball nothing is asked."""
+    made: Tensor = _plans(state.ball, state.players, state.types, state.actor)
+    return made

@@ -134,7 +134,6 @@ _AT_LEAST: dict[str, float] = {
     "model.parameter_hidden": 1,
     "model.kick_dropout": 0,
     "model.kick_attention": 0,
-    "model.kick_options": False,
     "train.kicks": 0,
     "train.balance_strength": 0,
     "train.epochs": 1,
@@ -231,7 +230,7 @@ def config_from(table: dict[str, Any], *, where: str, errors: Iterable[str] = ()
 def _idle(config: Config) -> list[str]:
     """Settings that would have no effect beside the others, and those that others need."""
     model, train = config.model, config.train
-    of_kicks = tuple(f"model.kick_{name}" for name in ("blocks", "hidden", "dropout", "attention", "options"))
+    of_kicks = tuple(f"model.kick_{name}" for name in ("blocks", "hidden", "dropout", "attention"))
     of_mixture = ("model.parameter_hidden", *of_kicks, "train.kicks")
     of_relative = ("model.blocks", "model.aims", "model.aim_hidden", *of_mixture)
     tables = (("model", model, ModelConfig()), ("train", train, TrainConfig()))
@@ -263,8 +262,6 @@ def _idle(config: Config) -> list[str]:
         else:
             lacking = [name for name in ("parameter_hidden", "kick_hidden") if not getattr(model, name)]
             problems += [f"model.head = mixture needs model.{name}" for name in lacking]
-    if model.kick_options and not model.kick_attention:
-        problems.append("model.kick_options needs model.kick_attention")
     if model.kick_attention % ATTENTION_HEADS:
         problems.append(f"model.kick_attention: expected a multiple of {ATTENTION_HEADS}, got {model.kick_attention}")
     if model.head == "mixture":

@@ -11,7 +11,6 @@ import fidelity_page
 import numpy as np
 import pytest
 import torch
-from tests.situations import situations
 from tests.synthetic import make_dataset
 
 from teamclone.dataset.layout import FLAG_ON_FIELD, Split
@@ -19,7 +18,7 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.evaluation.evaluate import predict
 from teamclone.models.network import Clone
 from teamclone.models.relative import RelativeFeatures
-from teamclone.models.state import CHANNEL, State, Target
+from teamclone.models.state import CHANNEL, State
 from teamclone.rcss.player_types import DEFAULTS
 from teamclone.training.config import load_config
 
@@ -87,29 +86,6 @@ def test_situations_of_a_player() -> None:
     assert fidelity.situations(state).tolist() == [0, 1, 2]
 
 
-def test_kicks_are_told_by_their_option() -> None:
-    """Kicks made from an option of each kind, and one that is none of them."""
-    torch.manual_seed(0)
-    model = Clone(load_config("best", ["model.hidden=[8]"]).model).eval()
-    state = situations(5)
-    ball = torch.zeros(5, 4)
-    ball[:, :2] = state.players[torch.arange(5), state.actor, :2] + 0.4
-    columns = model.features(state._replace(ball=ball))
-    with torch.no_grad():
-        kick = model.answer(columns).kick[0]
-        power, angle = (part.centre[:, fidelity.COUNT :] for part in (kick.power, kick.direction))
-        possible = kick.power.logits[:, fidelity.COUNT :] > fidelity.IMPOSSIBLE
-        kinds = model.head.kick.options.kinds
-        chosen = [int(torch.where(possible[row] & (kinds == row))[0][0]) for row in range(4)]
-        values = torch.tensor([[33.3, 77.7]]).repeat(5, 1)
-        values[:4] = torch.stack([of[range(4), chosen] for of in (power, torch.rad2deg(angle))], 1)
-        target = Target(torch.full((5,), fidelity.CLONED.index("kick")), values)
-        given, likeliest = fidelity.options_given(model, columns, target)
-        shares = [answer.power.logits.softmax(1)[:, fidelity.COUNT :] for answer in model.answer(columns).kick]
-    assert given.tolist() == [0, 1, 2, 3, fidelity.OTHER_KICK]
-    assert likeliest[:4].tolist() == [int(sum(shares)[row].argmax()) == chosen[row] for row in range(4)]
-
-
 def test_shares_of_situations_add_up() -> None:
     probabilities, kind = np.array([[[0.8, 0.2, 0, 0], [0.8, 0.2, 0, 0], [0.5, 0.5, 0, 0]]]), np.array([0, 1, 0])
     found = fidelity.by_situation(probabilities, kind, np.array([0, 0, 2]))
@@ -166,7 +142,7 @@ def test_results_are_kept_and_their_page_has_their_numbers(work: fidelity.Work, 
     results = work.load()
     assert list(results["markov"]["sets"]) == ["test Green", "unseen"]
     options = {"variants": {}, "commands": ["teamclone ingest"], "sure": 0.8}
-    options |= {"situations": fidelity.SITUATIONS, "option_kinds": fidelity.OPTION_KINDS}
+    options |= {"situations": fidelity.SITUATIONS}
     fidelity_page.write(
         tmp_path / "page.md", results=results, left={}, cleaning=work.dataset.meta["cleaning"], **options
     )
@@ -196,8 +172,9 @@ def test_the_learning_curve_is_a_table_and_a_plot(work: fidelity.Work, tmp_path:
         for count in MATCHES
     }
     left = work.what_is_left(results)
-    left["kicks"] = {"unseen": {"kicks": 1234, "options": 427, "share": [0.2, 0.1, 0.3, 0.15, 0.25]}}
-    left["kicks"]["unseen"] |= {"likeliest": [0.21, None, 0.53, 0.34], "likeliest_of_all": 0.36}
+    left["kicks"] = {"unseen": {"kicks": 1234, "as_planned": 0.91, "among": 0.95, "clone": None}}
+    left["choices"] = {"pass": {"rows": 321, "as_planned": 0.9, "other_kick": 0.04, "dash": 0.06}}
+    left["choices"]["pass"] |= {"turn": 0.0, "tackle": None}
     # All of these say the same, whatever the number of matches.
     for name, fit in left["curve"].items():
         assert fit["scale"] == pytest.approx(0.0, abs=1e-9)
@@ -210,10 +187,10 @@ def test_the_learning_curve_is_a_table_and_a_plot(work: fidelity.Work, tmp_path:
         cleaning=None,
         commands=[],
         situations=fidelity.SITUATIONS,
-        option_kinds=fidelity.OPTION_KINDS,
         sure=0.8,
     )
     text = (tmp_path / "page.md").read_text()
     assert "![Cross-entropy by training matches](page.svg)" in text
-    assert "| unseen | 1,234 | 20 % | 10 % | 30 % | 15 % | 25 % | 36 % | 21 % / - / 53 % / 34 % |" in text
+    assert "| unseen | 1,234 | 91 % | 95 % | - |" in text
+    assert "| pass | 321 | 90 % | 4 % | 6 % | 0 % | - |" in text
     assert (tmp_path / "page.svg").read_text().startswith("<?xml")

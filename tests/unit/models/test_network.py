@@ -112,7 +112,7 @@ MODELS = {
     "point": replace(SMALL, head="point", kick_blocks=(), kick_hidden=(), parameter_hidden=()),
     "past": replace(SMALL, blocks=("self", "past")),
     "attention": replace(SMALL, kick_attention=8),
-    "options": replace(SMALL, kick_attention=8, kick_options=True),
+    "plan": replace(SMALL, kick_attention=8, kick_blocks=("ball", "plan")),
     "all": replace(SMALL, blocks=BLOCKS, kick_blocks=BLOCKS, kick_attention=4, dropout=0.2, kick_dropout=0.2),
 }
 
@@ -267,7 +267,7 @@ def test_turns_teach_the_aims_and_nothing_else_through_their_own_bell() -> None:
     assert model.head.loss(others, without, aim_weight=0.5).total == model.head.loss(others, without).total
 
 
-@pytest.mark.parametrize("config", [SMALL, replace(SMALL, members=2), MODELS["options"]], ids=("one", "two", "options"))
+@pytest.mark.parametrize("config", [SMALL, replace(SMALL, members=2), MODELS["plan"]], ids=("one", "two", "plan"))
 def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> None:
     """What is asked for is the same, and the rest of the answer, too."""
     model = Clone(config).eval()
@@ -292,7 +292,7 @@ def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> 
     assert (points[1].parameters[others, 3:] == 0).all()
 
 
-@pytest.mark.parametrize("config", [SMALL, MODELS["options"]], ids=("free", "options"))
+@pytest.mark.parametrize("config", [SMALL, MODELS["plan"]], ids=("free", "plan"))
 def test_a_batch_without_kicks_learns(config: ModelConfig) -> None:
     model = Clone(config)
     state = situations(12)

@@ -17,7 +17,7 @@ from teamclone.models.mirror import mirror_state
 from teamclone.models.physics import kick_rate, radians
 from teamclone.models.state import CHANNEL, State
 from teamclone.planning.kicking import COUNTS, PLACES, paths
-from teamclone.planning.plan import CHOICES, NEAR_BALL_M, PLAN, WAYS, WORTHS, plans
+from teamclone.planning.plan import CHOICES, KICK_OF, NEAR_BALL_M, PLAN, WAYS, WORTHS, plans
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.store import create_store
 from teamclone.store.ingest import ingest
@@ -273,8 +273,7 @@ def test_agents_of_real_matches_do_as_planned(samples_dir: Path, tmp_path: Path)
     ways = made[:, PLAN.index("shot_vx") :].view(-1, len(WAYS), 2)
     exact = (ways - given[:, None]).norm(dim=2) < 0.004
     chosen = made[:, 1 : 1 + len(CHOICES)].argmax(1)
-    kicks = {**{name: index for index, name in enumerate(WAYS)}, "prepare": WAYS.index("pass")}
-    taken = torch.tensor([kicks.get(name, -1) for name in CHOICES])[chosen]
+    taken = torch.tensor([WAYS.index(KICK_OF[name]) if name in KICK_OF else -1 for name in CHOICES])[chosen]
     right = exact.gather(1, taken.clamp(min=0)[:, None])[:, 0] & (taken >= 0)
     assert right.float().mean() > 0.8
     assert exact.any(1).float().mean() > 0.85

@@ -170,7 +170,6 @@ MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidde
         (["model.parameter_hidden=[8]"], "model.parameter_hidden has no effect with model.features = paper"),
         (["model.kick_dropout=0.1"], "model.kick_dropout has no effect with model.features = paper"),
         (["model.kick_attention=8"], "model.kick_attention has no effect with model.features = paper"),
-        (["model.kick_options=true"], "model.kick_options has no effect with model.features = paper"),
         (["train.kicks=8"], "train.kicks has no effect with model.features = paper"),
         (["train.aim_weight=0.1"], "train.aim_weight has no effect with model.head = point"),
         (["model.head=mixture"], "model.head = mixture needs model.features = relative"),
@@ -204,10 +203,6 @@ MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidde
         (
             ["model.features=relative", *MIXTURE, "model.kick_attention=6"],
             "model.kick_attention: expected a multiple of 4, got 6",
-        ),
-        (
-            ["model.features=relative", *MIXTURE, "model.kick_options=true"],
-            "model.kick_options needs model.kick_attention",
         ),
         (["model.features=relative", *MIXTURE, "train.aim_weight=1"], "train.aim_weight has no effect with model.aims"),
         (

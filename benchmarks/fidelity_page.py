@@ -460,9 +460,9 @@ def _plans(found: Mapping[str, Any], choices: Mapping[str, Any]) -> str:
         for name, row in choices.items()
     ]
     headers = ("set", "kicks", "as planned", "one of the ways planned", "as `best-0` says")
-    return f"""What [plans](train.md#what-the-preset-best-trains) by the rules of HELIOS Base say by themselves: kicks that
-give the ball the very velocity that was planned, to four millimetres per cycle; that of any way there was; and the one that
-`best-0` answers with.
+    return f"""What [plans](train.md#what-the-preset-best-trains) by the rules of HELIOS Base say by themselves:
+kicks that give the ball the very velocity that was planned, to four millimetres per cycle; that of any way there was;
+and the one that `best-0` answers with.
 
 {table(headers, kicks)}
 

@@ -29,7 +29,7 @@ from teamclone.models.physics import (
     tackle_failure,
 )
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
-from teamclone.planning.plan import CHOICES, PLAN, WAYS, WORTHS, plans
+from teamclone.planning.plan import CHOICES, PLAN, UNDERWAY, WAYS, WORTHS, plans
 from teamclone.planning.plan import FAR_M as WORTH_M
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
@@ -420,6 +420,10 @@ def _plan(state: State) -> tuple[Tensor, Tensor]:
         *(column[f"{name}_there"] for name in WAYS),
     ]
     seen += [worths / WORTH_M, worths.clamp(-1.0, 1.0), column["pass_kicks"] / 3, column["pass_cycles"] / 20]
+    for name in UNDERWAY:
+        value = column[f"underway_{name}"]
+        # What misses by centimetres was meant, what misses by more was not.
+        seen += [value / 20] if name.endswith("dashes") else [value, (value * 5).clamp(max=1.0)]
     return torch.cat(seen, 1), torch.cat([column[name] for name in WAY], 1)
 
 

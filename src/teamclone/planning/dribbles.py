@@ -43,6 +43,7 @@ from teamclone.planning.bodies import (
     dashes,
     direction,
     fastest,
+    gap,
     in_their_box,
     kernel,
     rolled,
@@ -77,6 +78,7 @@ OWN_GOAL_M = 18.0
 STRIDE_DASHES = 10
 """Runs with more dashes come in steps of two."""
 ON_DASHES, ON_INSIDE_M, LEAST_PUSH, PUSH_STEP = 20, 0.5, 0.3, 0.05
+FAR_OFF_M = 1.0
 VALUE, TO_X, TO_Y, SPEED, DIRECTION, TURNS_FIRST, CYCLES = range(7)
 """Columns of what is found."""
 
@@ -338,3 +340,57 @@ def best_going_on(scene: Array) -> Array:
         if value > best[VALUE]:
             best[VALUE], best[TO_X], best[TO_Y], best[CYCLES] = value, ball_x, ball_y, dash
     return best
+
+
+@kernel
+def _missed(scene: Array, off: float, turns_first: int, run: bool) -> tuple[float, int]:
+    """The least distance between the ball as it rolls and where a run or a dribble has it after turns and dashes, and
+    after how many dashes.
+
+    Args:
+        off: direction of the dashes from the body.
+    """
+    me, ball = scene[ME], scene[BALL]
+    most = RUN_DASHES[-1] if run else DASHES[1]
+    ahead = 0.0 if run else me[SIZE] + AHEAD * me[MARGIN]
+    cos, sin = math.cos(math.radians(me[BODY] + off)), math.sin(math.radians(me[BODY] + off))
+    x, y, vx, vy = me[X], me[Y], me[VX], me[VY]
+    state = tired(me)
+    for _ in range(turns_first):
+        x, y, vx, vy = x + vx, y + vy, vx * me[DECAY], vy * me[DECAY]
+        rest(me, state)
+    best, when = FAR_OFF_M, 0
+    for dash in range(1, most + 1):
+        push = push_of(me, state, min(spare(me, state, RUN_RESERVE if run else DRIBBLE_RESERVE), 100.0))
+        vx, vy = vx + push * cos, vy + push * sin
+        x, y, vx, vy = x + vx, y + vy, vx * me[DECAY], vy * me[DECAY]
+        way = rolled(1.0, turns_first + dash)
+        away = gap(ball[0] + ball[2] * way, ball[1] + ball[3] * way, x + ahead * cos, y + ahead * sin)
+        if away < best:
+            best, when = away, dash
+    return best, when
+
+
+@kernel
+def underway(scene: Array) -> Array:
+    """Whether the ball rolls as if he had kicked it before, for a dribble or a run that he is about to go on with.
+
+    By how many metres it misses where it would be then, at most FAR_OFF_M, and after how many dashes: (6,) of a dribble
+    and of a run straight on, and of the nearer of both after a turn.
+    """
+    me = scene[ME]
+    found = np.zeros(6)
+    found[0], found[1] = _missed(scene, 0.0, 0, False)
+    found[2], found[3] = _missed(scene, 0.0, 0, True)
+    found[4] = FAR_OFF_M
+    one_turn = 180.0 / (1.0 + me[INERTIA] * math.hypot(me[VX], me[VY]))
+    for run in (False, True):
+        step, count = (RUN_STEP_DEG, RUNS) if run else (360.0 / TURNS, TURNS)
+        for turn in range(1, count):
+            off = turned(step * turn)
+            if abs(off) > one_turn:
+                continue
+            away, dash = _missed(scene, off, 1, run)
+            if away < found[4] and (dash >= LEAST_RUN or not run):
+                found[4], found[5] = away, dash
+    return found

@@ -46,7 +46,7 @@ from teamclone.planning.bodies import (
     prepare,
     turned,
 )
-from teamclone.planning.dribbles import best_dribble, best_going_on, best_run
+from teamclone.planning.dribbles import best_dribble, best_going_on, best_run, underway
 from teamclone.planning.holding import TURN, hold, stays
 from teamclone.planning.kicking import Wish, paths, several_kicks
 from teamclone.planning.passes import CYCLES, DIRECTION, FARTHEST_M, KEEPER_BACK_X, KICKS, SPEED, VALUE, best_pass
@@ -63,6 +63,8 @@ KICK_OF = {**{name: name for name in WAYS}, "prepare": "pass"}
 _SHOT, _CLEAR, _PASS, _DRIBBLE, _RUN, _HOLD, _PREPARE, _TURN, _DASH, _LEAVE = range(len(CHOICES))
 WORTHS = ("pass", "dribble", "run", "dash", "hold")
 """What is compared."""
+UNDERWAY = "dribble_m", "dribble_dashes", "run_m", "run_dashes", "turn_m", "turn_dashes"
+"""As of `dribbles.underway`."""
 PLAN = (
     "able",
     *(f"choose_{name}" for name in CHOICES),
@@ -70,6 +72,7 @@ PLAN = (
     *(f"{name}_worth" for name in WORTHS),
     "pass_kicks",
     "pass_cycles",
+    *(f"underway_{name}" for name in UNDERWAY),
     *(f"{name}_{axis}" for name in WAYS for axis in ("vx", "vy")),
 )
 """What `plans` gives; all 0 but for who can kick the ball. WORTHS are metres beyond the best of the others, at most
@@ -79,7 +82,7 @@ NEAR_BALL_M = 2.0
 """More than any player reaches."""
 _WAY = PLAN.index("shot_vx")
 """Where the velocities begin."""
-_THERE, _WORTH = PLAN.index("shot_there"), PLAN.index("pass_worth")
+_THERE, _WORTH, _UNDERWAY = PLAN.index("shot_there"), PLAN.index("pass_worth"), PLAN.index("underway_dribble_m")
 ENOUGH_SHOT, ENOUGH_PASS = 0.99, 0.96
 """Parts of the wanted speed that will do."""
 FORWARD_X, FORWARD_DEG, FREE_M = 42.0, 110.0, 4.0
@@ -198,6 +201,7 @@ def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> Non
             there[way] = 1.0
             velocity[2 * way] = found[dribbles.SPEED] * math.cos(angle)
             velocity[2 * way + 1] = found[dribbles.SPEED] * math.sin(angle)
+    made[_UNDERWAY : _UNDERWAY + len(UNDERWAY)] = underway(scene)
     held, velocity[2 * _HOLD], velocity[2 * _HOLD + 1] = hold(scene)
     there[_HOLD] = held != TURN
 

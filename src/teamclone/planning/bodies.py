@@ -133,7 +133,7 @@ def turns(player: Array, toward: float, metres: float, near_m: float) -> int:
     left = abs(turned(toward - player[BODY]))
     speed = math.hypot(player[VX], player[VY])
     count = 0
-    while left > margin:
+    while left > margin and count < RUN:
         left -= 180.0 / (1.0 + player[INERTIA] * speed)
         speed *= player[DECAY]
         count += 1

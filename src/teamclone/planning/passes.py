@@ -166,7 +166,7 @@ def _offered(scene: Array, kind: int, mate: int, to_xy: tuple[float, float], one
     if kind != DIRECT:
         first = max(first, _receivable(scene, mate, kind, x, y))
     quickest = min(BALL_SPEED_MAX * BALL_DECAY ** FEWEST[kind], player[AREA] + player[PUSH] * DASHES[kind])
-    slowest = scene[mate, TOP] if kind == DIRECT else HARDLY
+    slowest = player[TOP] if kind == DIRECT else HARDLY
     for cycles in range(first, first + LATER[kind] + 1):
         speed = speed_over(metres, cycles)
         arriving = speed * BALL_DECAY**cycles
@@ -200,15 +200,15 @@ def _safe(scene: Array, one: Array) -> bool:
     kind, to_x, cycles = int(one[KIND]), one[TO_X], int(one[CYCLES])
     bold = False
     if kind == THROUGH:
-        bold = one[SPEED] * math.cos(math.radians(one[DIRECTION])) > 2.0 and (
-            to_x > scene[BALL, OFFSIDE] or to_x > FAR_X
-        )
+        forward = one[SPEED] * math.cos(math.radians(one[DIRECTION])) > BOLD_SPEED
+        bold = forward and (to_x > scene[BALL, OFFSIDE] or to_x > FAR_X)
     else:
         cycles += int(one[KICKS]) - 1
     when, who = _first_to(scene, one, cycles, bold)
     if when > cycles:
         return True
-    if kind == THROUGH and to_x > FAR_X and cycles >= LONG_CYCLES and scene[who, KEEPER] == 0 and when >= cycles:
+    together = kind == THROUGH and when == cycles and scene[who, KEEPER] == 0
+    if together and to_x > FAR_X and cycles >= LONG_CYCLES:
         receiver = scene[int(one[RECEIVER])]
         straight = direction(to_x - receiver[X], one[TO_Y] - receiver[Y])
         return abs(turned(receiver[BODY] - straight)) < FOLLOWS_DEG

@@ -7,6 +7,7 @@ time is taken, if it is worth more than where the ball is, which is held otherwi
 
 from __future__ import annotations
 
+import logging
 import math
 import zlib
 from functools import cache
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 from numba import njit
+from numba.core import event
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -134,7 +136,7 @@ def _play(scene: Array, order: NDArray[np.int64], passed: Array) -> tuple[bool, 
 def _free(scene: Array) -> bool:
     """Whether he may turn: nobody is near."""
     for opponent in range(OPPONENT, BALL):
-        if gap(scene[opponent, X], scene[opponent, Y], scene[ME][X], scene[ME][Y]) < FREE_M:
+        if gap(scene[opponent, X], scene[opponent, Y], scene[ME, X], scene[ME, Y]) < FREE_M:
             return False
     return True
 
@@ -264,6 +266,20 @@ _plan_all = _compiled()
 _order = cache(paths)
 
 
+class _CompilationTeller(event.Listener):
+    """Logs that plans are being compiled, which takes long where their code is not in the cache on disk."""
+
+    def on_start(self, event: event.Event) -> None:
+        if event.data["dispatcher"] is _plan_all:
+            logging.getLogger(__name__).info("compiling the plans with the ball, once (half a minute)")
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register("numba:compile", _CompilationTeller())  # type: ignore[no-untyped-call]  # numba lacks the types
+
+
 @torch.library.custom_op("teamclone::plan", mutates_args=())
 def _plans(ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> Tensor:
     """What `plans` does, as an operation of PyTorch: it can be a part of what is exported."""
@@ -275,6 +291,7 @@ def _plans(ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> Tenso
         parts = (part.index_select(0, near).cpu().numpy() for part in (ball, players, types, actor))
         near_ball, near_players, near_types, actors = parts
         _plan_all(described(near_ball, near_players, near_types), actors, _order(), made)
+        made[~np.isfinite(made)] = 0.0  # whatever a log may hold
     return ball.new_zeros(len(each), len(PLAN)).index_copy(0, near, torch.from_numpy(made).to(ball))
 
 

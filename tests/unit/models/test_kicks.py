@@ -11,12 +11,24 @@ import torch
 from tests.situations import situations
 
 from teamclone.models.config import ModelConfig
-from teamclone.models.kicks import AHEAD_M, BALL_SPEED_MAX, COUNT, DRIBBLES, FREE, LEAD_M, TOUCH_M, Kicks
+from teamclone.models.kicks import (
+    AHEAD_M,
+    BALL_SPEED_MAX,
+    COUNT,
+    DRIBBLES,
+    FREE,
+    IMPOSSIBLE,
+    LEAD_M,
+    TOUCH_M,
+    USUAL_ERROR,
+    Kicks,
+)
 from teamclone.models.mirror import mirror_state, mirror_target
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
 from teamclone.models.network import Clone
 from teamclone.models.relative import GEOMETRY, MATES
 from teamclone.models.state import State, Target
+from teamclone.planning.plan import WAYS
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 
 GOAL, AIMED = MATES, MATES + 1 + FREE
@@ -45,6 +57,12 @@ def kick(*, component: int = 0, outputs: dict[str, float] | None = None, **value
         power, direction = kicks(torch.zeros(1, 3), geometry(**values))
     assert power.logits is direction.logits
     return [float(power.centre[0, component]), float(direction.centre[0, component]) / DEGREE]
+
+
+def planned(ways: dict[str, tuple[float, float]]) -> torch.Tensor:
+    """The same situation with ways to go on, and the velocities that they give the ball."""
+    columns = [[1.0, *ways[name]] if name in ways else [0.0, 0.0, 0.0] for name in WAYS]
+    return torch.cat([geometry(ball_vx=0.3, ball_vy=-0.2), torch.tensor(columns).view(1, -1)], 1)
 
 
 def needed(wanted: Sequence[float], *, gain: float = 0.02, motion: Sequence[float] = (0.0, 0.0)) -> list[float]:
@@ -157,6 +175,42 @@ def model(request: pytest.FixtureRequest) -> Clone:
     state = situations(100, seed=5)
     model.inputs.fit([model.inputs.project(State(*(tensor[state.ball[:, 1] > 0] for tensor in state)))])
     return model.eval()
+
+
+def test_each_way_that_is_planned_is_a_component() -> None:
+    """Those that there are; beside them the free ones."""
+    kicks = Kicks(3, planned=True)
+    ways = {"pass": (1.2, 0.7), "hold": (-0.1, 0.2)}
+    with torch.no_grad():
+        power, direction = kicks(torch.zeros(1, 3), planned(ways))
+    assert power.logits.shape == direction.logits.shape == (1, COUNT + len(WAYS))
+    for place, name in enumerate(WAYS, COUNT):
+        if name in ways:
+            found = [float(power.centre[0, place]), float(direction.centre[0, place]) / DEGREE]
+            assert found == pytest.approx(needed(ways[name], motion=(0.3, -0.2)), abs=0.1)
+            assert power.logits[0, place] > IMPOSSIBLE
+        else:
+            assert power.logits[0, place] == direction.logits[0, place] == IMPOSSIBLE
+    # The free ones are as without a plan.
+    alone = Kicks(3)
+    alone.load_state_dict(kicks.state_dict(), strict=False)
+    with torch.no_grad():
+        free, _ = alone(torch.zeros(1, 3), geometry(ball_vx=0.3, ball_vy=-0.2))
+    torch.testing.assert_close(power.centre[:, :COUNT], free.centre)
+
+
+def test_errors_of_what_is_planned_are_of_the_ball_velocity() -> None:
+    """The harder a kick, the less a wrong velocity turns it."""
+    kicks = Kicks(3, planned=True)
+    assert kicks.planned is not None
+    with torch.no_grad():
+        kicks.planned.error[WAYS.index("pass")] = math.log(2.0)
+        power, direction = kicks(torch.zeros(1, 3), planned({"pass": (1.2, 0.7), "run": (0.5, -0.2)}))
+    for name, factor, added in (("pass", 2.0, math.hypot(0.9, 0.9)), ("run", 1.0, 0.2)):
+        place = COUNT + WAYS.index(name)
+        error = factor * USUAL_ERROR
+        assert power.scale[0, place].item() == pytest.approx(LEAST_POWER + error / 0.02)
+        assert direction.scale[0, place].item() == pytest.approx(LEAST_ANGLE + error / added, rel=1e-2)
 
 
 def mirrored(state: State) -> State:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.situations import put, resting, situations
 
-from situations import put, resting, situations
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.dataset.layout import FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.dataset.reader import open_dataset

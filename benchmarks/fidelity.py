@@ -47,10 +47,10 @@ from teamclone.files import write_json
 from teamclone.machine import processor
 from teamclone.models.config import BLOCKS
 from teamclone.models.network import parameter_count
-from teamclone.models.physics import kick_rate, kickable_area, radians, reach_ball
+from teamclone.models.physics import kickable_area, kicked, reach_ball
+from teamclone.models.planning.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
 from teamclone.models.relative import RelativeFeatures
 from teamclone.models.state import CHANNEL, State
-from teamclone.planning.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
@@ -580,13 +580,9 @@ class Work:
             made = plans(state)
             able = torch.nonzero(made[:, 0] > 0).squeeze(1)
             me, types = (of[able, state.actor[able]] for of in (state.players, state.types))
-            ball, body = state.ball[able], radians(me[:, CHANNEL["body"]])
-            gain = kick_rate(ball[:, :2] - me[:, :2], body, types)
-            power, direction = target.parameters[able].unbind(1)
-            added = torch.polar(gain * power, radians(direction) + body)
             rows.append(part[able.numpy()])
             planned.append(made[able].numpy())
-            given.append((ball[:, 2:] + torch.view_as_real(added)).numpy())
+            given.append(kicked(state.ball[able], me, types, target.parameters[able]).numpy())
         return np.concatenate(rows), np.concatenate(planned), np.concatenate(given)
 
     def _kicks_of_clone(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -595,12 +591,10 @@ class Work:
         state = self.dataset.state(rows, history=model.inputs.history)
         outcome = predict(model, self.dataset, rows)
         me, types = (of[torch.arange(len(rows)), state.actor] for of in (state.players, state.types))
-        body = radians(me[:, CHANNEL["body"]])
-        gain = kick_rate(state.ball[:, :2] - me[:, :2], body, types)
         place = [PARAMETERS.index(item) for item in PARAMETERS if item.kind.name == "KICK"]
-        power, direction = torch.from_numpy(outcome.parameters[:, place]).unbind(1)
-        added = torch.polar(gain * power, radians(direction) + body)
-        found: NDArray[np.float32] = (state.ball[:, 2:] + torch.view_as_real(added)).numpy()
+        found: NDArray[np.float32] = kicked(
+            state.ball, me, types, torch.from_numpy(outcome.parameters[:, place])
+        ).numpy()
         return found
 
 

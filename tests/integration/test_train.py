@@ -17,6 +17,8 @@ from tests.synthetic import make_dataset
 from teamclone.dataset.layout import DETAIL, MISSING, Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.evaluation.evaluate import evaluate
+from teamclone.evaluation.latency import measure_latency
 from teamclone.models.network import Clone
 from teamclone.training.config import Config, load_config, to_table
 from teamclone.training.loop import Progress, train
@@ -442,6 +444,17 @@ def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, cha
     lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **changes))
     with pytest.raises(DatasetError, match=rf"match 0{{15}}{match} has no {channel} in its log"):
         train(tiny(), lacking, tmp_path / "run")
+
+
+def test_evaluation_names_a_value_that_a_log_lacks(dataset: Dataset, tmp_path: Path) -> None:
+    run = train(tiny(), dataset, tmp_path / "run")
+    detail = dataset.frames["detail"].numpy().copy()
+    detail[:, :, DETAIL["vx"]] = MISSING
+    lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **{"frames/detail": detail}))
+    with pytest.raises(DatasetError, match="has no vx in its log"):
+        evaluate(run, dataset=lacking)
+    with pytest.raises(DatasetError, match="has no vx in its log"):
+        measure_latency(run.load_model(), lacking, n=10)
 
 
 def test_tensorboard_shows_each_epoch_once_after_a_resume(dataset: Dataset, tmp_path: Path) -> None:

@@ -11,14 +11,13 @@ that is meant. Only `scan_shows` and `scan_commands` are called from Python; onl
 
 from __future__ import annotations
 
-import logging
 from typing import Any
 
 import numpy as np
 from numba import njit
-from numba.core import event
 from numpy.typing import NDArray
 
+from teamclone.compiling import tell_when_compiled
 from teamclone.rcss.commands import CommandKind
 
 Bytes = NDArray[np.uint8]
@@ -988,17 +987,9 @@ def scan_commands(
     return row
 
 
-class _CompilationTeller(event.Listener):
-    """Logs that a kernel is being compiled, which takes seconds where its code is not in the cache on disk."""
-
-    def on_start(self, event: event.Event) -> None:
-        kernel = event.data["dispatcher"]
-        if kernel is scan_shows or kernel is scan_commands:
-            what = "game" if kernel is scan_shows else "command"
-            logging.getLogger(__name__).info("compiling the reader of %s logs, once (some seconds)", what)
-
-    def on_end(self, event: event.Event) -> None:
-        pass
-
-
-event.register("numba:compile", _CompilationTeller())  # type: ignore[no-untyped-call]  # numba lacks the types
+tell_when_compiled(
+    {
+        kernel: f"compiling the reader of {what} logs, once (some seconds)"
+        for kernel, what in ((scan_shows, "game"), (scan_commands, "command"))
+    }
+)

@@ -14,8 +14,8 @@ from teamclone.models import mixture
 from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
 from teamclone.models.physics import covered
+from teamclone.models.planning.plan import WAYS
 from teamclone.models.relative import MATES, geometry_of, mates_of, ways_of
-from teamclone.planning.plan import WAYS
 from teamclone.rcss import pitch
 
 FREE = 3
@@ -75,7 +75,7 @@ class Planned(nn.Module):
 
 
 class Kicks(nn.Module):
-    """Mixtures of power and direction of a kick, both with the shares of the same COUNT components.
+    """Mixtures of power and direction of a kick, both with the shares of the same components, COUNT and those planned.
 
     Args:
         width: of what a kick is decided on.

@@ -64,6 +64,20 @@ def kick_rate(ball: Tensor, body: Tensor, types: Tensor) -> Tensor:
     return types[..., TYPE_FIELD["kick_power_rate"]] * (1.0 - 0.25 * away - 0.25 * (gap / margin).clamp(-0.2, 1.0))
 
 
+def kicked(ball: Tensor, player: Tensor, types: Tensor, arguments: Tensor) -> Tensor:
+    """(batch, 2) velocity of the ball after a kick, metres per cycle on the pitch, without the noise of the server.
+
+    Args:
+        ball: (batch, 4). player: (batch, channels) who kicks. types: (batch, fields) his. arguments: (batch, 2) power
+            and degrees from his body.
+    """
+    body = radians(player[:, CHANNEL["body"]])
+    place = player[:, [CHANNEL["x"], CHANNEL["y"]]]
+    direction = radians(arguments[:, 1]) + body
+    added = kick_rate(ball[:, :2] - place, body, types) * arguments[:, 0]
+    return ball[:, 2:] + added[:, None] * torch.stack([torch.cos(direction), torch.sin(direction)], 1)
+
+
 def tackle_failure(forward: Tensor, aside: Tensor) -> Tensor:
     """Probability that a tackle fails, 1 and more where it cannot succeed (rcssserver `player.cpp`, tackle).
 

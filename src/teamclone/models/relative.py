@@ -28,9 +28,9 @@ from teamclone.models.physics import (
     reach_ball,
     tackle_failure,
 )
+from teamclone.models.planning.plan import CHOICES, PLAN, UNDERWAY, WAYS, WORTHS, plans
+from teamclone.models.planning.plan import FAR_M as WORTH_M
 from teamclone.models.state import CHANNEL, TYPE_FIELD, State
-from teamclone.planning.plan import CHOICES, PLAN, UNDERWAY, WAYS, WORTHS, plans
-from teamclone.planning.plan import FAR_M as WORTH_M
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import DEFAULTS, GROUPS
@@ -107,11 +107,11 @@ def ways_of(geometry: Tensor) -> Tensor:
 
 
 class RelativeFeatures(nn.Module):
-    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is.
+    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is; WAY with the block ``plan``.
 
     Args:
         blocks: some of BLOCKS; ``scene`` is always among the columns.
-        others: end with OTHER of all OTHERS, as they are, too.
+        others: have OTHER of all OTHERS, as they are, between GEOMETRY and WAY.
     """
 
     signs: Tensor
@@ -145,7 +145,7 @@ class RelativeFeatures(nn.Module):
         state = _any(self.history)
         plain, mirrored = self.project(state), self.project(mirror_state(state, torch.arange(22)))
         turned = (plain + mirrored).abs().amax(0) < (plain - mirrored).abs().amax(0)
-        # In none of these has anybody the ball.
+        # Nobody has the ball in these, so that of what is planned there is nothing to be seen.
         turned |= torch.tensor([name in SIDED for name in self.names])
         return torch.where(turned, -1.0, 1.0)
 
@@ -158,7 +158,7 @@ class RelativeFeatures(nn.Module):
     def project(self, state: State) -> Tensor:
         """(batch, len(names)) before normalisation."""
         parts = self._parts(state)
-        after = (*("geometry",), *(("others",) if self.others else ()), *(("ways",) if "plan" in self.blocks else ()))
+        after = ("geometry", *(("others",) if self.others else ()), *(("ways",) if "plan" in self.blocks else ()))
         return torch.cat([parts[name] for name in ("scene", *self.blocks, *after)], dim=1)
 
     def fit(self, chunks: Iterable[Tensor]) -> None:
@@ -168,7 +168,7 @@ class RelativeFeatures(nn.Module):
         self.normalisation.mean[self.signs[: self.n_inputs] < 0] = 0.0
 
     def normalise(self, columns: Tensor) -> Tensor:
-        """(batch, len(names)) of what `project` gives; GEOMETRY and OTHER stay."""
+        """(batch, len(names)) of what `project` gives; GEOMETRY, OTHER and WAY stay."""
         inputs, geometry = columns[:, : self.n_inputs], columns[:, self.n_inputs :]
         return torch.cat([self.normalisation(inputs).clamp(-CLIP, CLIP), geometry], dim=1)
 

@@ -38,8 +38,6 @@ FIT_ROWS = 2**20
 """Training samples that the input normalisation is fitted on, evenly spread; more would not move it."""
 WARM_UP = 200
 """Batches over which the cosine schedule rises."""
-GATHER_ROWS = 16384
-"""Rows gathered at once where the batch size does not matter; bounds memory."""
 ONEDNN_ACTIVATIONS = ("relu", "gelu")
 """Those that PyTorch can take through oneDNN in single precision, forth and back."""
 

@@ -26,9 +26,9 @@ from teamclone.models.kicks import (
 from teamclone.models.mirror import mirror_state, mirror_target
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
 from teamclone.models.network import Clone
+from teamclone.models.planning.plan import WAYS
 from teamclone.models.relative import GEOMETRY, MATES
 from teamclone.models.state import State, Target
-from teamclone.planning.plan import WAYS
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 
 GOAL, AIMED = MATES, MATES + 1 + FREE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from teamclone.planning.bodies import (
+from teamclone.models.planning.bodies import (
     CAPACITY,
     DASH_RATE,
     EFFORT,

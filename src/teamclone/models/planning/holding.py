@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from teamclone.planning.bodies import (
+from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.models.physics import BALL_SIZE
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
-    BALL_DECAY,
     BALL_RAND,
-    BALL_SIZE,
-    BALL_SPEED_MAX,
     BODY,
     CATCH_M,
     GAIN,
@@ -40,7 +39,6 @@ from teamclone.planning.bodies import (
 )
 from teamclone.rcss import pitch
 
-TURN, KICK, STOP = range(3)
 SAFE = 100.0
 """Score of a place that no opponent is near to."""
 ALMOST = 1e-5
@@ -154,20 +152,20 @@ def stop(scene: Array) -> tuple[float, float]:
 
 
 @kernel
-def hold(scene: Array) -> tuple[int, float, float]:
-    """TURN, or KICK or STOP and the velocity that the ball is to have."""
+def hold(scene: Array) -> tuple[bool, float, float]:
+    """Whether he turns, and else the velocity that the ball is to have."""
     me, ball, gain = scene[ME], scene[BALL], scene[BALL, GAIN]
     next_x, next_y = me[X] + me[VX], me[Y] + me[VY]
     if inside(ball[0] + ball[2], ball[1] + ball[3]) and stays(scene, 0.15):
         rest_x, rest_y = at_rest(me)
         facing = abs(turned(me[BODY] - direction(FACE_X - rest_x, -rest_y))) < FACED_DEG
         if not facing and score(scene, ball[0] + ball[2], ball[1] + ball[3]) >= SAFE - ALMOST:
-            return TURN, 0.0, 0.0
+            return True, 0.0, 0.0
     body = math.radians(me[BODY])
     x, y = next_x + (me[SIZE] + FRONT_M) * math.cos(body), next_y + (me[SIZE] + FRONT_M) * math.sin(body)
     near = inside(x, y) and math.hypot(x - ball[0] - ball[2], y - ball[1] - ball[3]) <= 100.0 * gain
     if near and score(scene, x, y) >= SAFE - ALMOST:
-        return KICK, x - ball[0], y - ball[1]
+        return False, x - ball[0], y - ball[1]
     doubt, most = math.hypot(me[VX], me[VY]) * PLAYER_RAND, me[KICK_RAND] * blur(scene)
     best, best_x, best_y = -np.inf, 0.0, 0.0
     for place in range(AROUND):
@@ -192,5 +190,4 @@ def hold(scene: Array) -> tuple[int, float, float]:
                 best, best_x, best_y = value, x - ball[0], y - ball[1]
     if best == -np.inf:
         best_x, best_y = stop(scene)
-        return STOP, best_x, best_y
-    return KICK, best_x, best_y
+    return False, best_x, best_y

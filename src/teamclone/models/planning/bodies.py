@@ -13,6 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from teamclone.dataset.layout import FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING
+from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.models.physics import BALL_SIZE, TURN_MARGIN_DEG
 from teamclone.models.state import CHANNEL, TYPE_FIELD
 from teamclone.rcss import pitch
 
@@ -37,17 +39,13 @@ away."""
 GAIN, OFFSIDE = BODY, STAMINA
 """Columns of the ball: speed that a unit of his kick power gives it; the offside line."""
 NOWHERE_M = 1e6
-BALL_SIZE, BALL_DECAY, BALL_SPEED_MAX, BALL_PUSH_MAX = 0.085, 0.94, 3.0, 2.7
-"""rcssserver `serverparam.cpp`: ball_size, ball_decay, ball_speed_max, ball_accel_max."""
-BALL_RAND, PLAYER_RAND = 0.05, 0.1
-"""rcssserver `serverparam.cpp`: ball_rand, player_rand."""
+BALL_PUSH_MAX, BALL_RAND, PLAYER_RAND = 2.7, 0.05, 0.1
+"""rcssserver `serverparam.cpp`: ball_accel_max, ball_rand, player_rand."""
 CATCH_M = math.hypot(1.2, 0.5)
 """From the keeper's centre to a far corner of what he can catch."""
 PENALTY_X, PENALTY_Y = pitch.HALF_LENGTH - pitch.PENALTY_AREA_LENGTH, pitch.PENALTY_AREA_WIDTH / 2
 GOAL_X, GOAL_Y = pitch.HALF_LENGTH, pitch.GOAL_WIDTH / 2
 NEVER = 1000
-LEAST_MARGIN_DEG = 15.0
-"""Who faces a place as well as this does not turn first."""
 HARDLY = 0.001
 """Metres that count as nothing."""
 
@@ -79,7 +77,8 @@ def described(ball: Array, players: Array, types: Array) -> Array:
     made[:, BALL, : len(_BALL)] = ball
     team = made[:, :BALL]
     team[..., :THERE] = players[..., _CHANNELS]
-    flags = players[..., _FLAGS].astype(np.int64)
+    with np.errstate(invalid="ignore"):
+        flags = players[..., _FLAGS].astype(np.int64)
     for column, flag in ((THERE, FLAG_ON_FIELD), (KEEPER, FLAG_GOALIE), (TACKLING, FLAG_TACKLING)):
         team[..., column] = (flags & flag) != 0
     team[team[..., THERE] == 0, :VX] = NOWHERE_M
@@ -129,7 +128,7 @@ def turns(player: Array, toward: float, metres: float, near_m: float) -> int:
     """How many turns until he faces a place so far away, in this direction, to within what ``near_m`` leaves."""
     margin = 180.0
     if near_m < metres:
-        margin = max(LEAST_MARGIN_DEG, math.degrees(math.asin(near_m / metres)))
+        margin = max(TURN_MARGIN_DEG, math.degrees(math.asin(near_m / metres)))
     left = abs(turned(toward - player[BODY]))
     speed = math.hypot(player[VX], player[VY])
     count = 0

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from teamclone.planning.bodies import (
+from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
-    BALL_DECAY,
-    BALL_SPEED_MAX,
     BODY,
     CATCH_M,
     GAIN,
@@ -45,7 +44,7 @@ from teamclone.planning.bodies import (
     turned,
     turns,
 )
-from teamclone.planning.worth import worth
+from teamclone.models.planning.worth import worth
 from teamclone.rcss import pitch
 
 DIRECT, LEAD, THROUGH = range(3)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from teamclone.planning.bodies import (
+from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
-    BALL_DECAY,
-    BALL_SPEED_MAX,
     CATCH_M,
     GAIN,
     GOAL_X,
@@ -20,6 +19,7 @@ from teamclone.planning.bodies import (
     PENALTY_X,
     PENALTY_Y,
     TACKLING,
+    THERE,
     TOP,
     Array,
     X,
@@ -34,8 +34,9 @@ from teamclone.planning.bodies import (
     steps,
     turned,
 )
-from teamclone.planning.passes import BEHIND_M
+from teamclone.models.planning.passes import BEHIND_M
 
+SAVED, KEEPER_LATE, OTHERS_LATE = -1, 1, 2
 FROM_M = 30.0
 PLACES, FASTER = 25, 0.3
 """In the goal, and the step in which speeds are tried."""
@@ -54,8 +55,8 @@ SEEN_NOISE = 0.02
 
 @kernel
 def _saved(scene: Array, angle: float, speed: float, last: int) -> int:
-    """Whether an opponent has a shot before the goal, -1; else 1 if the keeper is too late for it, and 2 more if all
-    others are by far."""
+    """SAVED where an opponent has the ball before the goal; else KEEPER_LATE if the keeper cannot even nearly, and
+    OTHERS_LATE if none of the others can."""
     me, ball = scene[ME], scene[BALL]
     keeper_late, others_late = True, True
     cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
@@ -82,23 +83,23 @@ def _saved(scene: Array, angle: float, speed: float, last: int) -> int:
                 if box:
                     metres -= SEEN_NOISE * math.hypot(player[X] - me[X], player[Y] - me[Y])
                 if metres - reach - 0.15 < HARDLY:
-                    return -1
+                    return SAVED
                 left = (metres - 0.9 * reach) * 0.999 if cycle > 1 else metres
                 needed = steps(player, (x - from_x, y - from_y), left, reach + 0.1)
                 if needed <= (cycle if box else cycle - 2):
-                    return -1
+                    return SAVED
                 if box and needed <= cycle + 1:
                     keeper_late = False
             else:
                 if metres - player[AREA] < HARDLY:
-                    return -1
+                    return SAVED
                 left = metres - 0.8 * player[AREA] if cycle > 1 else metres
                 needed = steps(player, (x - from_x, y - from_y), left, player[AREA])
                 if needed <= cycle - 1:
-                    return -1
+                    return SAVED
                 if needed <= cycle + 1:
                     others_late = False
-    return keeper_late + 2 * others_late
+    return KEEPER_LATE * keeper_late + OTHERS_LATE * others_late
 
 
 @kernel
@@ -115,7 +116,7 @@ def best_shot(scene: Array) -> tuple[float, float, float, float]:
     keeper_at = 0.0
     keeper = -1
     for opponent in range(OPPONENT, BALL):
-        if scene[opponent, KEEPER] > 0:
+        if scene[opponent, KEEPER] > 0 and scene[opponent, THERE] > 0:
             keeper = opponent
             keeper_at = direction(scene[opponent, X] - ball[0], scene[opponent, Y] - ball[1])
     best, best_y, best_speed, best_one = 0.0, 0.0, 0.0, 0.0
@@ -130,16 +131,16 @@ def best_shot(scene: Array) -> tuple[float, float, float, float]:
             if speed > BALL_SPEED_MAX - 0.001:
                 speed, last = BALL_SPEED_MAX, True
             cycles = cycles_over(metres, speed)
-            late = 3 if cycles <= 1 else _saved(scene, angle, speed, cycles)
-            if late >= 0:
-                value = 1.0 + 50.0 * (speed <= one + 0.001) + 100.0 * (late & 1) + 100.0 * (late >> 1)
+            late = KEEPER_LATE + OTHERS_LATE if cycles <= 1 else _saved(scene, angle, speed, cycles)
+            if late != SAVED:
+                value = 1.0 + 50.0 * (speed <= one + 0.001) + 100.0 * ((late & 1) + (late >> 1))
                 if keeper >= 0:
-                    width = KEEPER_LATE_DEG if late & 1 else KEEPER_DEG
+                    width = KEEPER_LATE_DEG if late & KEEPER_LATE else KEEPER_DEG
                     value *= 1.0 - math.exp(-0.5 * (turned(angle - keeper_at) / width) ** 2)
                 if metres > FAR_M:
                     value *= math.exp(-0.5 * (max(0.0, abs(y) - WIDE_Y) / (GOAL_Y - INSIDE_MOST_M)) ** 2)
                 if value > best:
                     best, best_y, best_speed, best_one = value, y, speed, one
-                last |= late == 3
+                last |= late == KEEPER_LATE + OTHERS_LATE
             speed += FASTER
     return goal_x, best_y, best_speed, best_one

@@ -6,14 +6,13 @@ import math
 
 import numpy as np
 
-from teamclone.models.physics import NEAR_M
-from teamclone.planning.bodies import (
+from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.models.physics import NEAR_M, TURN_MARGIN_DEG
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
-    BALL_DECAY,
     BALL_PUSH_MAX,
     BALL_RAND,
-    BALL_SPEED_MAX,
     BODY,
     CAPACITY,
     CATCH_M,
@@ -25,7 +24,6 @@ from teamclone.planning.bodies import (
     HARDLY,
     INERTIA,
     KEEPER,
-    LEAST_MARGIN_DEG,
     MARGIN,
     ME,
     OPPONENT,
@@ -51,9 +49,9 @@ from teamclone.planning.bodies import (
     steps,
     turned,
 )
-from teamclone.planning.passes import TACKLED_CYCLES
-from teamclone.planning.stamina import FORCE, LEFT, LOW, push_of, rest, spare, tired
-from teamclone.planning.worth import worth
+from teamclone.models.planning.passes import TACKLED_CYCLES
+from teamclone.models.planning.stamina import FORCE, LEFT, LOW, push_of, rest, spare, tired
+from teamclone.models.planning.worth import worth
 from teamclone.rcss import pitch
 
 TURNS, DASHES, AHEAD = 16, (2, 4), 0.2
@@ -79,13 +77,19 @@ STRIDE_DASHES = 10
 """Runs with more dashes come in steps of two."""
 ON_DASHES, ON_INSIDE_M, LEAST_PUSH, PUSH_STEP = 20, 0.5, 0.3, 0.05
 FAR_OFF_M = 1.0
-VALUE, TO_X, TO_Y, SPEED, DIRECTION, TURNS_FIRST, CYCLES = range(7)
-"""Columns of what is found."""
+VALUE, SPEED, DIRECTION = range(3)
+"""Columns of what is found: what it is worth, speed of the ball and where it goes."""
+MID_X, UP_X, THEIR_X = 0.0, 30.0, 27.0
+"""Behind these dribblers, and runners, think that opponents are a cycle later."""
+IN_THE_WAY_M = 0.8
+"""Opponents so far ahead of the ball of a run are a cycle later, too."""
+SEEN_NOISE = 0.01
+"""Of an opponent's distance: by how much nearer he may be."""
 
 
 @kernel
 def _none() -> Array:
-    found = np.zeros(7)
+    found = np.zeros(3)
     found[VALUE] = -np.inf
     return found
 
@@ -108,8 +112,8 @@ def _hindered(scene: Array, x: float, y: float, cycles: int) -> bool:
         if metres - reach < HARDLY:
             return True
         needed = steps(player, (x - from_x, y - from_y), metres - 0.5 * reach - 0.2, reach)
-        spare = -TACKLED_CYCLES if player[TACKLING] > 0 else (x < 30.0) + (x < 0.0)
-        if needed - spare <= cycles:
+        allowance = -TACKLED_CYCLES if player[TACKLING] > 0 else (x < UP_X) + (x < MID_X)
+        if needed - allowance <= cycles:
             return True
     return False
 
@@ -129,7 +133,7 @@ def best_dribble(scene: Array) -> Array:
         left = abs(turned(360.0 / TURNS * turn))
         speed = math.hypot(me[VX], me[VY]) * me[DECAY]
         turns_first = 0
-        while left > FACED_DEG:
+        while left > FACED_DEG and turns_first <= MOST_TURNS:
             left = max(0.0, left - 180.0 / (1.0 + me[INERTIA] * speed))
             speed *= me[DECAY]
             turns_first += 1
@@ -155,6 +159,8 @@ def best_dribble(scene: Array) -> Array:
                 continue
             cycles = 1 + turns_first + dash
             metres = math.hypot(to_x - ball[0], to_y - ball[1])
+            if metres < HARDLY:
+                continue
             wanted = speed_over(metres, cycles)
             ball_x, ball_y = wanted * (to_x - ball[0]) / metres, wanted * (to_y - ball[1]) / metres
             push = math.hypot(ball_x - ball[2], ball_y - ball[3])
@@ -165,8 +171,7 @@ def best_dribble(scene: Array) -> Array:
             value = worth(scene, to_x, to_y, True)
             if value <= best[VALUE] or _hindered(scene, to_x, to_y, cycles):
                 continue
-            best[VALUE], best[TO_X], best[TO_Y], best[SPEED] = value, to_x, to_y, wanted
-            best[DIRECTION], best[TURNS_FIRST], best[CYCLES] = direction(ball_x, ball_y), turns_first, cycles
+            best[VALUE], best[SPEED], best[DIRECTION] = value, wanted, direction(ball_x, ball_y)
     return best
 
 
@@ -199,12 +204,12 @@ def _overtaken(scene: Array, x: float, y: float, speed: float, cycles: int) -> b
             continue
         if metres - reach < HARDLY:
             return True
-        left = metres - reach - 0.2 - 0.01 * math.hypot(player[X] - me[X], player[Y] - me[Y])
+        left = metres - reach - 0.2 - SEEN_NOISE * math.hypot(player[X] - me[X], player[Y] - me[Y])
         needed = steps(player, (x - from_x, y - from_y), left, reach)
-        spare = 0
-        if along > 0.8:
-            spare = 1 + (-TACKLED_CYCLES if player[TACKLING] > 0 else (x < 27.0))
-        if needed - spare <= cycles:
+        allowance = 0
+        if along > IN_THE_WAY_M:
+            allowance = 1 + (-TACKLED_CYCLES if player[TACKLING] > 0 else (x < THEIR_X))
+        if needed - allowance <= cycles:
             return True
     return False
 
@@ -264,8 +269,7 @@ def best_run(scene: Array) -> Array:
                 continue
             if _overtaken(scene, to_x, to_y, speed, cycles):
                 continue
-            best[VALUE], best[TO_X], best[TO_Y], best[SPEED] = value, to_x, to_y, speed
-            best[DIRECTION], best[TURNS_FIRST], best[CYCLES] = direction(ball_x, ball_y), turns_first, cycles
+            best[VALUE], best[SPEED], best[DIRECTION] = value, speed, direction(ball_x, ball_y)
     return best
 
 
@@ -286,7 +290,7 @@ def opponents_first(scene: Array) -> int:
             off = abs(turned(direction(x - from_x, y - from_y) - player[BODY]))
             if away < NEAR_M and off > 90.0:
                 off = 180.0 - off
-            left = off - max(LEAST_MARGIN_DEG, math.degrees(math.asin(player[AREA] / away)))
+            left = off - max(TURN_MARGIN_DEG, math.degrees(math.asin(player[AREA] / away)))
             count = 0
             slower = math.hypot(player[VX], player[VY])
             while left > 0 and count <= cycle:
@@ -299,10 +303,10 @@ def opponents_first(scene: Array) -> int:
 
 
 @kernel
-def best_going_on(scene: Array) -> Array:
-    """Dashes straight on that keep the ball in reach without a kick: where it then is, as far as is worth most."""
+def best_going_on(scene: Array) -> float:
+    """What dashes straight on are worth that keep the ball in reach without a kick; minus infinity where none do."""
     me, ball = scene[ME], scene[BALL]
-    best = _none()
+    best = -np.inf
     cos, sin = math.cos(math.radians(me[BODY])), math.sin(math.radians(me[BODY]))
     x, y, vx, vy = me[X], me[Y], me[VX], me[VY]
     ball_x, ball_y, ball_vx, ball_vy = ball[0], ball[1], ball[2], ball[3]
@@ -336,9 +340,7 @@ def best_going_on(scene: Array) -> Array:
         vx, vy = vx * me[DECAY], vy * me[DECAY]
         push_of(me, state, push / rate)
         ball_vx, ball_vy = ball_vx * BALL_DECAY, ball_vy * BALL_DECAY
-        value = worth(scene, ball_x, ball_y, True)
-        if value > best[VALUE]:
-            best[VALUE], best[TO_X], best[TO_Y], best[CYCLES] = value, ball_x, ball_y, dash
+        best = max(best, worth(scene, ball_x, ball_y, True))
     return best
 
 

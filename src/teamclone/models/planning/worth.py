@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from teamclone.planning.bodies import (
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
     GOAL_X,

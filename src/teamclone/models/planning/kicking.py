@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.planning.bodies import (
+from teamclone.models.features import BALL_DECAY
+from teamclone.models.physics import BALL_SIZE
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
-    BALL_DECAY,
     BALL_PUSH_MAX,
     BALL_RAND,
-    BALL_SIZE,
     BODY,
     CATCH_M,
     GAIN,
@@ -43,7 +43,7 @@ from teamclone.planning.bodies import (
     kick_rate,
     turned,
 )
-from teamclone.planning.holding import FOUL_EXPONENT, TACKLE_M, TACKLE_WIDTH_M, blur
+from teamclone.models.planning.holding import FOUL_EXPONENT, TACKLE_M, TACKLE_WIDTH_M, blur
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import DEFAULTS
 
@@ -58,6 +58,13 @@ TACKLE_EXPONENT = 6.0
 """rcssserver `serverparam.cpp`: tackle_exponent."""
 LOST, TACKLED, SOON_TACKLED, SOON_LOST, CUT_OFF, MAYBE_CUT_OFF, OUTSIDE, MISSED = (1 << bit for bit in range(8))
 """What may happen to a ball in a place, or kicked on from there."""
+PRICES = 0.0, 0.5, 0.3, 0.6, 0.0, 0.25, 0.0, 0.03
+"""What each of them takes of a sequence's worth, in their order."""
+TOO_SLOW, SLOWER, SHORT = -10.0, 100.0, 0.05
+"""Worth of a sequence that is too slow, and less for each metre per cycle; what one kick loses that is slow enough."""
+MORE_KICKS, HARD, HARDEST, POWER, SECURED = (0.05, 0.2), (90.0, 0.025), (94.0, 0.075), 0.0005, 0.05
+"""What two and three kicks lose; a last kick above a power; each unit of it; by how much less several kicks mind that
+the ball may be cut off."""
 RISKS = TACKLED | SOON_TACKLED | SOON_LOST | MAYBE_CUT_OFF | MISSED
 NEAR_M = 10.0
 """Opponents further from the ball are not looked at."""
@@ -96,7 +103,7 @@ def paths() -> NDArray[np.int64]:
         for first, (from_x, from_y) in enumerate(places):
             for second, (to_x, to_y) in enumerate(places):
                 vx, vy = to_x - from_x, to_y - from_y
-                speed = fastest(cos, sin, rates[second], vx, vy)
+                speed = fastest.py_func(cos, sin, rates[second], vx, vy)
                 power = math.hypot(speed * cos - vx, speed * sin - vy) / rates[second]
                 pairs.append((speed, power, first, second))
         pairs.sort(key=functools.cmp_to_key(order))
@@ -212,28 +219,20 @@ def _places(me: Array, radius: Array, rate: Array, place: Array) -> None:
 
 @kernel
 def _judged(wish: Wish, speed: float, power: float, kicks: int, dangers: int) -> float:
-    """How good a sequence of kicks is."""
-    if speed < wish.speed and (kicks > 1 or speed < wish.enough):
-        value = -10000.0 - 100000.0 * (wish.speed - speed)
+    """How good a sequence of kicks is, 1 for the best: PRICES of what may happen, of each kick more, and of its last
+    one's power."""
+    short = wish.speed - speed
+    if short > 0 and (kicks > 1 or speed < wish.enough):
+        value = TOO_SLOW - SLOWER * short
     else:
-        value = 1000.0 - (50.0 if speed < wish.speed else 0.0)
-    if dangers & TACKLED:
-        value -= 500.0
-    if dangers & SOON_TACKLED:
-        value -= 300.0
-    if dangers & SOON_LOST:
-        value -= 600.0
-    if dangers & MAYBE_CUT_OFF:
-        value -= 250.0 if kicks == 1 else 200.0
-    if dangers & MISSED:
-        value -= 30.0
+        value = 1.0 - (SHORT if short > 0 else 0.0)
+    for bit in range(len(PRICES)):
+        if dangers & (1 << bit):
+            value -= PRICES[bit]
     if kicks > 1:
-        value -= 200.0 if kicks == 3 else 50.0
-        if power > 94.0:
-            value -= 75.0
-        elif power > 90.0:
-            value -= 25.0
-    return value - 0.5 * power
+        value -= MORE_KICKS[kicks - 2] + (HARDEST[1] if power > HARDEST[0] else HARD[1] if power > HARD[0] else 0.0)
+        value += SECURED if dangers & MAYBE_CUT_OFF else 0.0
+    return value - POWER * power
 
 
 @kernel

@@ -1,13 +1,13 @@
 """The plan of who has the ball: all ways to go on, what each is worth, and which an agent of HELIOS Base takes.
 
-It follows what is published of HELIOS Base (Akiyama et al., github.com/helios-base): who can score shoots; who has an
-opponent at the ball hits it towards the goal; else the best of passes, dribbles and runs that no opponent reaches in
-time is taken, if it is worth more than where the ball is, which is held otherwise. Written anew from how it acts.
+Who can score shoots; who has an opponent at the ball hits it towards the goal; else the best of passes, dribbles and
+runs that no opponent reaches in time is taken, if it is worth more than where the ball is, which is held otherwise.
+This and all numbers are as agents of HELIOS Base and its library librcsc act (Akiyama et al.,
+github.com/helios-base), from their public sources and the logs; the code is our own.
 """
 
 from __future__ import annotations
 
-import logging
 import math
 import zlib
 from functools import cache
@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import torch
 from numba import njit
-from numba.core import event
 from numpy.typing import NDArray
 from torch import Tensor
 
-from teamclone.models.state import CHANNEL, State
-from teamclone.planning import dribbles, passes
-from teamclone.planning.bodies import (
+from teamclone.compiling import tell_when_compiled
+from teamclone.models import features, physics
+from teamclone.models.planning import dribbles, passes
+from teamclone.models.planning.bodies import (
     AREA,
     BALL,
     BODY,
@@ -48,12 +48,23 @@ from teamclone.planning.bodies import (
     prepare,
     turned,
 )
-from teamclone.planning.dribbles import best_dribble, best_going_on, best_run, underway
-from teamclone.planning.holding import TURN, hold, stays
-from teamclone.planning.kicking import Wish, paths, several_kicks
-from teamclone.planning.passes import CYCLES, DIRECTION, FARTHEST_M, KEEPER_BACK_X, KICKS, SPEED, VALUE, best_pass
-from teamclone.planning.shots import best_shot
-from teamclone.planning.worth import worth
+from teamclone.models.planning.dribbles import best_dribble, best_going_on, best_run, underway
+from teamclone.models.planning.holding import hold, stays
+from teamclone.models.planning.kicking import Wish, paths, several_kicks
+from teamclone.models.planning.passes import (
+    CYCLES,
+    DIRECTION,
+    FARTHEST_M,
+    KEEPER_BACK_X,
+    KICKS,
+    SPEED,
+    VALUE,
+    best_pass,
+)
+from teamclone.models.planning.shots import best_shot
+from teamclone.models.planning.worth import worth
+from teamclone.models.state import CHANNEL, State
+from teamclone.rcss import pitch
 
 WAYS = ("shot", "clear", "pass", "dribble", "run", "hold")
 """Ways to kick."""
@@ -145,6 +156,8 @@ def _free(scene: Array) -> bool:
 def _complete(scene: Array, actor: int) -> bool:
     """Fill what of a scene follows from who has the ball; whether he can kick it."""
     ball, me = scene[BALL], scene[actor]
+    if not np.isfinite(scene).all():  # whatever a log may hold
+        return False
     own_m = gap(ball[0], ball[1], me[X], me[Y])
     if me[THERE] == 0 or own_m > me[AREA]:
         return False
@@ -204,15 +217,15 @@ def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> Non
             velocity[2 * way] = found[dribbles.SPEED] * math.cos(angle)
             velocity[2 * way + 1] = found[dribbles.SPEED] * math.sin(angle)
     made[_UNDERWAY : _UNDERWAY + len(UNDERWAY)] = underway(scene)
-    held, velocity[2 * _HOLD], velocity[2 * _HOLD + 1] = hold(scene)
-    there[_HOLD] = held != TURN
+    turns, velocity[2 * _HOLD], velocity[2 * _HOLD + 1] = hold(scene)
+    there[_HOLD] = not turns
 
     worths = np.array(
         [
             passed[VALUE],
             dribbled[VALUE],
             ran[VALUE],
-            best_going_on(scene)[VALUE],
+            best_going_on(scene),
             worth(scene, ball[0], ball[1], True),
         ]
     )
@@ -243,15 +256,16 @@ def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> Non
     elif best == 3:
         choice = _DASH
     else:
-        choice = _TURN if held == TURN else _HOLD
+        choice = _TURN if turns else _HOLD
     made[1 + choice] = 1.0
 
 
 def _compiled() -> Any:
     """A kernel that plans on many scenes."""
-    # Numba keeps what it compiled as long as the file of this function stays the same. It hangs on all of them.
-    sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-    version = zlib.crc32(sources)
+    # Numba keeps what it compiled as long as the file of this function stays the same. It hangs on all of these.
+    constants = (Path(str(module.__file__)) for module in (features, physics, pitch))
+    sources = (*sorted(Path(__file__).parent.glob("*.py")), *constants)
+    version = zlib.crc32(b"".join(path.read_bytes() for path in sources))
 
     @njit(cache=True, nogil=True, error_model="numpy")
     def plan_all(scenes: Array, actors: NDArray[np.int64], order: NDArray[np.int64], made: Array) -> int:
@@ -266,18 +280,7 @@ _plan_all = _compiled()
 _order = cache(paths)
 
 
-class _CompilationTeller(event.Listener):
-    """Logs that plans are being compiled, which takes long where their code is not in the cache on disk."""
-
-    def on_start(self, event: event.Event) -> None:
-        if event.data["dispatcher"] is _plan_all:
-            logging.getLogger(__name__).info("compiling the plans with the ball, once (half a minute)")
-
-    def on_end(self, event: event.Event) -> None:
-        pass
-
-
-event.register("numba:compile", _CompilationTeller())  # type: ignore[no-untyped-call]  # numba lacks the types
+tell_when_compiled({_plan_all: "compiling the plans with the ball, once (half a minute)"})
 
 
 @torch.library.custom_op("teamclone::plan", mutates_args=())
@@ -291,7 +294,6 @@ def _plans(ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> Tenso
         parts = (part.index_select(0, near).cpu().numpy() for part in (ball, players, types, actor))
         near_ball, near_players, near_types, actors = parts
         _plan_all(described(near_ball, near_players, near_types), actors, _order(), made)
-        made[~np.isfinite(made)] = 0.0  # whatever a log may hold
     return ball.new_zeros(len(each), len(PLAN)).index_copy(0, near, torch.from_numpy(made).to(ball))
 
 

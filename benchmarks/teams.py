@@ -114,7 +114,7 @@ def figures_of(name: str, clone: Mapping[str, Any]) -> list[str]:
         f"{model['cross_entropy']['value']:.3f}",
         f"{model['ece']['value']:.4f}",
         f"{kick['recall']['value']:.2f}",
-        f"{parameters['kick_direction']['median']:.0f}, {parameters['kick_direction']['mean']['value']:.0f}",
+        f"{parameters['kick_direction']['median']:.1f}, {parameters['kick_direction']['mean']['value']:.1f}",
         f"{parameters['turn_moment']['mean']['value']:.1f}",
         f"{parameters['dash_power']['mean']['value']:.1f}",
         f"{test['baselines']['persistence']['accuracy']['value']:.3f}",

@@ -41,6 +41,10 @@ GAIN, OFFSIDE = BODY, STAMINA
 NOWHERE_M = 1e6
 BALL_PUSH_MAX, BALL_RAND, PLAYER_RAND = 2.7, 0.05, 0.1
 """rcssserver `serverparam.cpp`: ball_accel_max, ball_rand, player_rand."""
+TACKLE_M, TACKLE_WIDTH_M = 2.0, 1.25
+"""The same: tackle_dist, tackle_width."""
+TACKLE_EXPONENT, FOUL_EXPONENT = 6.0, 10.0
+"""The same: tackle_exponent, foul_exponent."""
 CATCH_M = math.hypot(1.2, 0.5)
 """From the keeper's centre to a far corner of what he can catch."""
 PENALTY_X, PENALTY_Y = pitch.HALF_LENGTH - pitch.PENALTY_AREA_LENGTH, pitch.PENALTY_AREA_WIDTH / 2
@@ -124,6 +128,12 @@ def dashes(player: Array, metres: float) -> int:
 
 
 @kernel
+def most_turn(player: Array, speed: float) -> float:
+    """Degrees that he turns in a cycle while he moves so fast (rcssserver `player.cpp`, turn)."""
+    return 180.0 / (1.0 + player[INERTIA] * speed)
+
+
+@kernel
 def turns(player: Array, toward: float, metres: float, near_m: float) -> int:
     """How many turns until he faces a place so far away, in this direction, to within what ``near_m`` leaves."""
     margin = 180.0
@@ -133,7 +143,7 @@ def turns(player: Array, toward: float, metres: float, near_m: float) -> int:
     speed = math.hypot(player[VX], player[VY])
     count = 0
     while left > margin and count < RUN:
-        left -= 180.0 / (1.0 + player[INERTIA] * speed)
+        left -= most_turn(player, speed)
         speed *= player[DECAY]
         count += 1
     return count
@@ -168,6 +178,29 @@ def at_rest(player: Array) -> tuple[float, float]:
 @kernel
 def in_their_box(x: float, y: float) -> bool:
     return x > PENALTY_X and abs(y) < PENALTY_Y
+
+
+@kernel
+def reach_of(player: Array, x: float, y: float) -> float:
+    """How far from his centre he has a ball in a place: who keeps the goal catches it in his box."""
+    return CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
+
+
+@kernel
+def beside(player: Array, from_xy: tuple[float, float], x: float, y: float) -> tuple[float, float]:
+    """How far a place is ahead of him, and aside, seen from where he is then."""
+    body = math.radians(player[BODY])
+    cos, sin = math.cos(body), math.sin(body)
+    away_x, away_y = x - from_xy[0], y - from_xy[1]
+    return away_x * cos + away_y * sin, away_y * cos - away_x * sin
+
+
+@kernel
+def tackle_chance(ahead: float, aside: float, exponent: float) -> float:
+    """Of a tackle at a ball there, 0 and less where it cannot succeed; `physics.tackle_failure` has the same."""
+    if ahead <= 0:
+        return 0.0
+    return 1.0 - ((ahead / TACKLE_M) ** exponent + (abs(aside) / TACKLE_WIDTH_M) ** exponent)
 
 
 @kernel

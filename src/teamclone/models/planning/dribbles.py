@@ -15,15 +15,12 @@ from teamclone.models.planning.bodies import (
     BALL_RAND,
     BODY,
     CAPACITY,
-    CATCH_M,
     DASH_RATE,
     DECAY,
     EXTRA,
     GAIN,
     GOAL_X,
     HARDLY,
-    INERTIA,
-    KEEPER,
     MARGIN,
     ME,
     OPPONENT,
@@ -42,8 +39,9 @@ from teamclone.models.planning.bodies import (
     direction,
     fastest,
     gap,
-    in_their_box,
     kernel,
+    most_turn,
+    reach_of,
     rolled,
     speed_over,
     steps,
@@ -106,7 +104,7 @@ def _hindered(scene: Array, x: float, y: float, cycles: int) -> bool:
             continue
         if (player[X] - ball[0]) * cos + (player[Y] - ball[1]) * sin < PAST_M:
             continue
-        reach = CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
+        reach = reach_of(player, x, y)
         from_x, from_y = coasted(player, cycles)
         metres = math.hypot(x - from_x, y - from_y)
         if metres - reach < HARDLY:
@@ -134,7 +132,7 @@ def best_dribble(scene: Array) -> Array:
         speed = math.hypot(me[VX], me[VY]) * me[DECAY]
         turns_first = 0
         while left > FACED_DEG and turns_first <= MOST_TURNS:
-            left = max(0.0, left - 180.0 / (1.0 + me[INERTIA] * speed))
+            left = max(0.0, left - most_turn(me, speed))
             speed *= me[DECAY]
             turns_first += 1
         if turns_first > MOST_TURNS:
@@ -184,7 +182,7 @@ def _overtaken(scene: Array, x: float, y: float, speed: float, cycles: int) -> b
     next_x, next_y = ball[0] + speed * cos, ball[1] + speed * sin
     for opponent in range(OPPONENT, BALL):
         player = scene[opponent]
-        reach = CATCH_M if player[KEEPER] > 0 and in_their_box(next_x, next_y) else player[AREA]
+        reach = reach_of(player, next_x, next_y)
         at_x, at_y = player[X] + player[VX], player[Y] + player[VY]
         if math.hypot(next_x - at_x, next_y - at_y) < reach + 0.1:
             return True
@@ -197,10 +195,10 @@ def _overtaken(scene: Array, x: float, y: float, speed: float, cycles: int) -> b
         along = (player[X] - ball[0]) * cos + (player[Y] - ball[1]) * sin
         if along < PAST_M:
             continue
-        reach = CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
+        reach = reach_of(player, x, y)
         from_x, from_y = coasted(player, cycles)
         metres = math.hypot(x - from_x, y - from_y)
-        if metres > scene[opponent, TOP] * cycles + reach:
+        if metres > player[TOP] * cycles + reach:
             continue
         if metres - reach < HARDLY:
             return True
@@ -223,7 +221,7 @@ def best_run(scene: Array) -> Array:
     for part in range(len(RUN_X)):
         if ball[0] >= RUN_X[part]:
             most = RUN_DASHES[part + 1]
-    one_turn = 180.0 / (1.0 + me[INERTIA] * math.hypot(me[VX], me[VY]) * me[DECAY])
+    one_turn = most_turn(me, math.hypot(me[VX], me[VY]) * me[DECAY])
     places = np.empty((most, 2))
     for run in range(RUNS):
         off = turned(RUN_STEP_DEG * run)
@@ -294,7 +292,7 @@ def opponents_first(scene: Array) -> int:
             count = 0
             slower = math.hypot(player[VX], player[VY])
             while left > 0 and count <= cycle:
-                left -= 180.0 / (1.0 + player[INERTIA] * slower)
+                left -= most_turn(player, slower)
                 slower *= player[DECAY]
                 count += 1
             if count + dashes(player, away - player[AREA]) <= cycle:
@@ -385,7 +383,7 @@ def underway(scene: Array) -> Array:
     found[0], found[1] = _missed(scene, 0.0, 0, False)
     found[2], found[3] = _missed(scene, 0.0, 0, True)
     found[4] = FAR_OFF_M
-    one_turn = 180.0 / (1.0 + me[INERTIA] * math.hypot(me[VX], me[VY]))
+    one_turn = most_turn(me, math.hypot(me[VX], me[VY]))
     for run in (False, True):
         step, count = (RUN_STEP_DEG, RUNS) if run else (360.0 / TURNS, TURNS)
         for turn in range(1, count):

@@ -13,10 +13,9 @@ from teamclone.models.planning.bodies import (
     BALL,
     BALL_RAND,
     BODY,
-    CATCH_M,
+    FOUL_EXPONENT,
     GAIN,
     GOAL_X,
-    KEEPER,
     KICK_RAND,
     MARGIN,
     ME,
@@ -24,6 +23,8 @@ from teamclone.models.planning.bodies import (
     PLAYER_RAND,
     PUSH,
     SIZE,
+    TACKLE_M,
+    TACKLE_WIDTH_M,
     TACKLING,
     VX,
     VY,
@@ -31,10 +32,13 @@ from teamclone.models.planning.bodies import (
     X,
     Y,
     at_rest,
+    beside,
     direction,
     in_their_box,
     kernel,
     kick_rate,
+    reach_of,
+    tackle_chance,
     turned,
 )
 from teamclone.rcss import pitch
@@ -44,8 +48,6 @@ SAFE = 100.0
 ALMOST = 1e-5
 NEAR_M = 4.05
 """Opponents further from the ball are not looked at."""
-TACKLE_M, TACKLE_WIDTH_M, FOUL_EXPONENT = 2.0, 1.25, 10.0
-"""rcssserver `serverparam.cpp`: tackle_dist, tackle_width, foul_exponent."""
 DASHES = 24
 """Directions in which an opponent may dash."""
 RINGS, AROUND, AROUND_DEG = (0.4, 0.6, 0.75), 20, 18.0
@@ -78,8 +80,7 @@ def score(scene: Array, x: float, y: float) -> float:
         if math.hypot(player[X] - ball[0], player[Y] - ball[1]) > NEAR_M or player[TACKLING] > 0:
             continue
         at_x, at_y = player[X] + player[VX], player[Y] + player[VY]
-        catches = player[KEEPER] > 0 and in_their_box(at_x, at_y) and in_their_box(x, y)
-        reach = CATCH_M if catches else player[AREA]
+        reach = reach_of(player, x, y) if in_their_box(at_x, at_y) else player[AREA]
         away = math.hypot(x - at_x, y - at_y)
         if away < 0.5 * reach:
             total -= 200.0
@@ -87,13 +88,9 @@ def score(scene: Array, x: float, y: float) -> float:
             total -= 150.0
         elif away < TACKLE_M - 0.2:
             total -= 25.0
-        body = math.radians(player[BODY])
-        cos, sin = math.cos(body), math.sin(body)
-        ahead, aside = (x - at_x) * cos + (y - at_y) * sin, (y - at_y) * cos - (x - at_x) * sin
+        ahead, aside = beside(player, (at_x, at_y), x, y)
         total -= 50.0 * max(0.0, reach - abs(aside))
-        if ahead > 0:
-            failure = (ahead / TACKLE_M) ** FOUL_EXPONENT + (abs(aside) / TACKLE_WIDTH_M) ** FOUL_EXPONENT
-            total -= 50.0 * max(0.0, 1.0 - failure)
+        total -= 50.0 * max(0.0, tackle_chance(ahead, aside, FOUL_EXPONENT))
         for dash in range(DASHES):
             degrees = 360.0 / DASHES * dash - 180.0
             push = player[PUSH] * dash_share(degrees)

@@ -17,10 +17,9 @@ from teamclone.models.planning.bodies import (
     BALL_PUSH_MAX,
     BALL_RAND,
     BODY,
-    CATCH_M,
+    FOUL_EXPONENT,
     GAIN,
     GOAL_X,
-    KEEPER,
     KICK_RAND,
     MARGIN,
     ME,
@@ -28,12 +27,16 @@ from teamclone.models.planning.bodies import (
     PLAYER_RAND,
     PUSH,
     SIZE,
+    TACKLE_EXPONENT,
+    TACKLE_M,
+    TACKLE_WIDTH_M,
     TACKLING,
     VX,
     VY,
     Array,
     X,
     Y,
+    beside,
     coasted,
     direction,
     fastest,
@@ -41,9 +44,11 @@ from teamclone.models.planning.bodies import (
     in_their_box,
     kernel,
     kick_rate,
+    reach_of,
+    tackle_chance,
     turned,
 )
-from teamclone.models.planning.holding import FOUL_EXPONENT, TACKLE_M, TACKLE_WIDTH_M, blur
+from teamclone.models.planning.holding import blur
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import DEFAULTS
 
@@ -54,8 +59,6 @@ OFF_M, WITHIN_M = 0.1, 0.2
 """How far a place is at least off his edge, and within his reach."""
 DIRECTIONS, PATHS = 72, 1024
 """Of kicks, and pairs of places before them that are tried, those first that give the ball most speed."""
-TACKLE_EXPONENT = 6.0
-"""rcssserver `serverparam.cpp`: tackle_exponent."""
 LOST, TACKLED, SOON_TACKLED, SOON_LOST, CUT_OFF, MAYBE_CUT_OFF, OUTSIDE, MISSED = (1 << bit for bit in range(8))
 """What may happen to a ball in a place, or kicked on from there."""
 PRICES = 0.0, 0.5, 0.3, 0.6, 0.0, 0.25, 0.0, 0.03
@@ -121,22 +124,6 @@ class Wish(NamedTuple):
 
 
 @kernel
-def _tackle(ahead: float, aside: float, exponent: float) -> float:
-    """Chance of a tackle."""
-    if ahead <= 0:
-        return 0.0
-    return 1.0 - (ahead / TACKLE_M) ** exponent - (abs(aside) / TACKLE_WIDTH_M) ** exponent
-
-
-@kernel
-def _beside(x: float, y: float, at_x: float, at_y: float, player: Array) -> tuple[float, float]:
-    """How far a place is ahead of an opponent, and aside."""
-    body = math.radians(player[BODY])
-    cos, sin = math.cos(body), math.sin(body)
-    return (x - at_x) * cos + (y - at_y) * sin, (y - at_y) * cos - (x - at_x) * sin
-
-
-@kernel
 def _after_a_dash(ahead: float, aside: float, push: float, reach: float) -> bool:
     """Whether he can kick it after a dash ahead or back."""
     return math.hypot(ahead + push, aside) < reach or math.hypot(ahead - push, aside) < reach
@@ -156,12 +143,11 @@ def _dangers(scene: Array, x: float, y: float) -> int:
             if away < player[SIZE]:
                 return found | LOST
             continue
-        catches = player[KEEPER] > 0 and in_their_box(player[X], player[Y]) and in_their_box(x, y)
-        reach = CATCH_M if catches else player[AREA]
+        reach = reach_of(player, x, y) if in_their_box(player[X], player[Y]) else player[AREA]
         if away < reach + 0.15:
             return found | LOST
-        ahead, aside = _beside(x, y, at_x, at_y, player)
-        if _tackle(ahead, aside, FOUL_EXPONENT) > SURE[0]:
+        ahead, aside = beside(player, (at_x, at_y), x, y)
+        if tackle_chance(ahead, aside, FOUL_EXPONENT) > SURE[0]:
             found |= TACKLED
         push = player[PUSH]
         if abs(aside) < reach and (abs(ahead) < push or _after_a_dash(ahead, aside, push, reach)):
@@ -187,16 +173,15 @@ def _dangers_after(scene: Array, x: float, y: float, wish: Wish, cycles: int) ->
             if away < player[SIZE]:
                 found |= CUT_OFF
             continue
-        catches = player[KEEPER] > 0 and in_their_box(at_x, at_y) and in_their_box(x, y)
-        reach = CATCH_M if catches else player[AREA]
+        reach = reach_of(player, x, y) if in_their_box(at_x, at_y) else player[AREA]
         if away < reach + 0.1:
             found |= CUT_OFF
             continue
-        ahead, aside = _beside(x, y, at_x, at_y, player)
+        ahead, aside = beside(player, (at_x, at_y), x, y)
         push = 0.8 * player[PUSH]
         near = abs(aside) < reach and (abs(ahead) < push or _after_a_dash(ahead, aside, push, reach - 0.15))
         tackles = abs(aside) < 0.7 * TACKLE_WIDTH_M and ahead - push < TACKLE_M - 0.5
-        if near or tackles or _tackle(ahead, aside, TACKLE_EXPONENT) > SURE[1]:
+        if near or tackles or tackle_chance(ahead, aside, TACKLE_EXPONENT) > SURE[1]:
             found |= MAYBE_CUT_OFF
     return found
 

@@ -11,7 +11,6 @@ from teamclone.models.planning.bodies import (
     AREA,
     BALL,
     BODY,
-    CATCH_M,
     GAIN,
     GOAL_X,
     HARDLY,
@@ -36,8 +35,8 @@ from teamclone.models.planning.bodies import (
     direction,
     fastest,
     gap,
-    in_their_box,
     kernel,
+    reach_of,
     rolled,
     speed_over,
     steps,
@@ -110,7 +109,7 @@ def _first_to(scene: Array, one: Array, most: int, bold: bool) -> tuple[int, int
         for cycle in range(max(1, int(aside / player[TOP])), min(most, best - 1) + 1):
             way_m = rolled(speed, cycle)
             x, y = ball[0] + cos * way_m, ball[1] + sin * way_m
-            reach = CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
+            reach = reach_of(player, x, y)
             from_x, from_y = coasted(player, cycle)
             metres = math.hypot(x - from_x, y - from_y)
             there = metres - reach - SAFETY_M < HARDLY

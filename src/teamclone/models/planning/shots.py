@@ -8,7 +8,6 @@ from teamclone.models.features import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.models.planning.bodies import (
     AREA,
     BALL,
-    CATCH_M,
     GAIN,
     GOAL_X,
     GOAL_Y,
@@ -30,6 +29,7 @@ from teamclone.models.planning.bodies import (
     fastest,
     in_their_box,
     kernel,
+    reach_of,
     rolled,
     steps,
     turned,
@@ -69,7 +69,7 @@ def _saved(scene: Array, angle: float, speed: float, last: int) -> int:
         away_x, away_y = player[X] - ball[0], player[Y] - ball[1]
         if away_x * cos + away_y * sin < BEHIND_M:
             continue
-        first = max(1, int(abs(away_y * cos - away_x * sin) / scene[opponent, TOP]))
+        first = max(1, int(abs(away_y * cos - away_x * sin) / player[TOP]))
         for cycle in range(first, last):
             way_m = rolled(speed, cycle)
             x, y = ball[0] + way_m * cos, ball[1] + way_m * sin
@@ -79,7 +79,7 @@ def _saved(scene: Array, angle: float, speed: float, last: int) -> int:
                 if x > GOAL_X:
                     break
                 box = in_their_box(x, y)
-                reach = CATCH_M if box else player[AREA]
+                reach = reach_of(player, x, y)
                 if box:
                     metres -= SEEN_NOISE * math.hypot(player[X] - me[X], player[Y] - me[Y])
                 if metres - reach - 0.15 < HARDLY:

@@ -39,8 +39,8 @@ away."""
 GAIN, OFFSIDE = BODY, STAMINA
 """Columns of the ball: speed that a unit of his kick power gives it; the offside line."""
 NOWHERE_M = 1e6
-BALL_PUSH_MAX, BALL_RAND, PLAYER_RAND = 2.7, 0.05, 0.1
-"""rcssserver `serverparam.cpp`: ball_accel_max, ball_rand, player_rand."""
+BALL_PUSH_MAX, PLAYER_PUSH_MAX, BALL_RAND, PLAYER_RAND = 2.7, 1.0, 0.05, 0.1
+"""rcssserver `serverparam.cpp`: ball_accel_max, player_accel_max, ball_rand, player_rand."""
 TACKLE_M, TACKLE_WIDTH_M = 2.0, 1.25
 """The same: tackle_dist, tackle_width."""
 TACKLE_EXPONENT, FOUL_EXPONENT = 6.0, 10.0
@@ -90,7 +90,7 @@ def described(ball: Array, players: Array, types: Array) -> Array:
         team[..., column] = types[..., TYPE_FIELD[name]]
     team[..., SIZE] += BALL_SIZE
     team[..., AREA] = team[..., SIZE] + team[..., MARGIN]
-    team[..., PUSH] = 100.0 * team[..., DASH_RATE] * team[..., EFFORT_MAX]
+    team[..., PUSH] = np.minimum(100.0 * team[..., DASH_RATE] * team[..., EFFORT_MAX], PLAYER_PUSH_MAX)
     return made
 
 

@@ -24,6 +24,7 @@ from teamclone.models.planning.bodies import (
     MARGIN,
     ME,
     OPPONENT,
+    PLAYER_PUSH_MAX,
     PLAYER_RAND,
     PUSH,
     SIZE,
@@ -322,7 +323,7 @@ def best_going_on(scene: Array) -> float:
         doubt += min(0.1, math.hypot(ball_x - ball[0], ball_y - ball[1]) * BALL_RAND)
         near, far = me[SIZE] + 0.2 - 0.1 * dash, me[AREA] - doubt - 0.15
         rate = me[DASH_RATE] * state[FORCE]
-        most = rate * min(100.0, spare(me, state, 1.0))
+        most = min(rate * min(100.0, spare(me, state, 1.0)), PLAYER_PUSH_MAX)
         push = most
         least = min(LEAST_PUSH, most - 0.001)
         done = False

@@ -258,6 +258,8 @@ def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> Non
     else:
         choice = _TURN if turns else _HOLD
     made[1 + choice] = 1.0
+    if not np.isfinite(made).all():  # a player whom no server makes: of a type, say, that never slows down
+        made[:] = 0.0
 
 
 def _compiled() -> Any:

@@ -12,6 +12,7 @@ from teamclone.models.planning.bodies import (
     EFFORT_MIN,
     EXTRA,
     INCOME,
+    PLAYER_PUSH_MAX,
     RECOVERY,
     STAMINA,
     Array,
@@ -47,7 +48,7 @@ def rest(me: Array, state: Array) -> None:
 @kernel
 def push_of(me: Array, state: Array, power: float) -> float:
     """Speed that a dash with this power adds; he is as tired as after it."""
-    push: float = power * me[DASH_RATE] * state[FORCE]
+    push: float = min(power * me[DASH_RATE] * state[FORCE], PLAYER_PUSH_MAX)
     state[LEFT] = max(0.0, state[LEFT] - power)
     rest(me, state)
     return push

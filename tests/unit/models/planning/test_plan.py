@@ -17,7 +17,7 @@ from teamclone.models.mirror import mirror_state
 from teamclone.models.physics import kicked
 from teamclone.models.planning.kicking import COUNTS, PLACES, paths
 from teamclone.models.planning.plan import CHOICES, KICK_OF, NEAR_BALL_M, PLAN, WAYS, WORTHS, plans
-from teamclone.models.state import CHANNEL, State
+from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.store import create_store
 from teamclone.store.ingest import ingest
@@ -94,6 +94,25 @@ def test_nothing_is_planned_on_what_no_log_should_hold(name: str, value: float) 
     state = scene()
     put(state, 0, **{name: value})
     assert (plans(state) == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("of_type", "name", "value"),
+    [
+        (True, "dash_power_rate", 1e9),
+        (True, "player_decay", 1.0),
+        (True, "kickable_margin", 0.0),
+        (True, "inertia_moment", 1e30),
+        (False, "effort", 1e9),
+        (False, "x", 1e30),
+    ],
+)
+def test_plans_on_whatever_a_log_may_hold_come_to_an_end(of_type: bool, name: str, value: float) -> None:
+    state = scene()
+    part, place = (state.types, TYPE_FIELD[name]) if of_type else (state.players, CHANNEL[name])
+    part[..., place] = value
+    state.ball[:, :2] = state.players[:, 0, [CHANNEL["x"], CHANNEL["y"]]]
+    assert torch.isfinite(plans(state)).all()
 
 
 def test_the_ball_may_lie_in_the_middle_of_a_player() -> None:

@@ -201,15 +201,11 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
     ]
     minutes = (f"train.max_minutes={PAPER_MINUTES * scale:g}",)
     made.append(Experiment(name="paper", step="b", preset="paper", overrides=TINY if quick else minutes))
-    for count in (count for count in CURVE if count < n_train):
-        # Half way between as many passes and as many steps as with all matches.
-        longer = epochs(short_epochs * (n_train / count) ** 0.5)
-        made.append(
-            Experiment(
-                name=f"curve-{count}", step="f", preset="best", overrides=(*tiny, *longer, *PLAIN), matches=count
-            )
-        )
     short = (*tiny, *epochs(short_epochs))
+    for count in (count for count in CURVE if count < n_train):
+        made.append(
+            Experiment(name=f"curve-{count}", step="f", preset="best", overrides=(*short, *PLAIN), matches=count)
+        )
     # Beside which the others of k stand, and those of d and e; the second is the last point of f, too.
     made.append(Experiment(name="short", step="k", preset="best", overrides=short))
     made.append(Experiment(name="plain", step="def", preset="best", overrides=(*short, *PLAIN)))
@@ -532,6 +528,7 @@ class Work:
             found["ensemble"] = self.figures(together)
         if is_run(self.out / "runs" / "best-0"):
             found["kicks"], found["choices"] = self.plans()
+            found["tackles"] = self.tackles()
         return found
 
     def plans(self) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
@@ -570,6 +567,29 @@ class Work:
             does |= {kind: here & (kinds == CLONED.index(kind)) for kind in ("dash", "turn", "tackle")}
             choices[name] = {"rows": int(here.sum()), **{what: _share(part[here]) for what, part in does.items()}}
         return found, choices
+
+    def tackles(self) -> dict[str, dict[str, Any]]:
+        """By set, how many tackles go where it is planned, and where `best-0` says."""
+        rows = self.rows[self.dataset.samples["kind"].numpy()[self.rows] == CLONED.index("tackle")]
+        planned = plans(self.dataset.state(rows)).numpy()
+        there, degrees = (planned[:, PLAN.index(f"tackle_{name}")] for name in ("there", "degrees"))
+        outcome = predict(open_run(self.out / "runs" / "best-0").load_model(), self.dataset, rows)
+        place = [item.name for item in PARAMETERS].index("tackle_direction")
+
+        def right(said: NDArray[np.float32]) -> NDArray[np.bool_]:
+            away = said - outcome.issued[:, place]
+            found: NDArray[np.bool_] = np.abs((away + 180.0) % 360.0 - 180.0) < EXACT_DEG
+            return found
+
+        as_planned, of_clone = right(degrees) & (there > 0), right(outcome.parameters[:, place])
+        return {
+            name: {
+                "tackles": int(here.sum()),
+                "as_planned": _share(as_planned[here]),
+                "clone": _share(of_clone[here]),
+            }
+            for name, here in ((name, np.isin(rows, self.rows[mask])) for name, mask in self.sets.items())
+        }
 
     def _with_ball(self) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
         """Those of ``rows`` whose player can kick the ball, what is planned, (n, len(PLAN)), and the velocity that a
@@ -623,6 +643,8 @@ def chunks(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
 
 EXACT = 0.004
 """Metres per cycle by which the velocity of the ball after a kick may miss what was planned; logs have four digits."""
+EXACT_DEG = 1.0
+"""The same of a tackle's direction; HELIOS Base chooses among 40, nine degrees apart."""
 
 
 SITUATIONS = ("ball kickable", "first of his team to the ball", "off the ball")

@@ -89,7 +89,7 @@ def write(
         parts += [_protocol(cleaning)]
     parts += [_goals(results), _spread(results), _numbers(results), _likelihood(results)]
     parts += [_variants("Training", TRAINING_TEXT, results, variants.get("t", {}), beside="best-0")]
-    parts += [_kicks(results, variants.get("k", {})), _plans(left.get("kicks", {}), left.get("choices", {}))]
+    parts += [_kicks(results, variants.get("k", {})), _plans(left)]
     parts += [_variants("What each part gains", ABLATIONS_TEXT, results, variants.get("d", {}))]
     parts += [_variants("Rare commands", REMEDIES_TEXT, results, variants.get("e", {}), rare=True)]
     curve = left.get("curve")
@@ -433,8 +433,8 @@ def _curve(curve: Mapping[str, Any], results: Results, *, plot: str) -> str:
     headers = ("set", "floor, nats", "without any one point", "exponent", "twice the matches", "ten times")
     return f"""## Learning curve
 
-`plain`, see above; with fewer matches it takes more epochs, by the root of how many fewer
-there are. Every smaller set of matches is a part of the larger ones.
+`plain`, see above; an epoch goes through few matches more than once (`data.repeat`). Every smaller set of matches is a
+part of the larger ones.
 
 ![Cross-entropy by training matches]({plot})
 
@@ -446,18 +446,22 @@ more matches alone would leave; from so few points it is a rough guess, as the f
 {table(headers, fits)}"""
 
 
-def _plans(found: Mapping[str, Any], choices: Mapping[str, Any]) -> str:
+def _plans(left: Mapping[str, Any]) -> str:
     """What is planned and what is done, of step g."""
-    if not found:
+    if "kicks" not in left:
         return ""
     kicks = [
         [name, f"{row['kicks']:,}", *(percent(row[key]) for key in ("as_planned", "among", "clone"))]
-        for name, row in found.items()
+        for name, row in left["kicks"].items()
+    ]
+    tackles = [
+        [name, f"{row['tackles']:,}", *(percent(row[key]) for key in ("as_planned", "clone"))]
+        for name, row in left["tackles"].items()
     ]
     done = [
         [name, f"{row['rows']:,}"]
         + [percent(row[key]) for key in ("as_planned", "other_kick", "dash", "turn", "tackle")]
-        for name, row in choices.items()
+        for name, row in left["choices"].items()
     ]
     headers = ("set", "kicks", "as planned", "one of the ways planned", "as `best-0` says")
     return f"""What [plans](train.md#what-the-preset-best-trains) by the rules of HELIOS Base say by themselves:
@@ -465,6 +469,10 @@ kicks that give the ball the very velocity that was planned, to four millimetres
 and the one that `best-0` answers with.
 
 {table(headers, kicks)}
+
+Tackles in the direction, one of 40, that was planned, and in the one that `best-0` says.
+
+{table(("set", "tackles", "as planned", "as `best-0` says"), tackles)}
 
 Of all commands of those who can kick the ball, by what is planned, what was given. Who goes on with what he planned
 before dashes or turns; a log does not tell.

@@ -9,30 +9,43 @@ from numpy.typing import NDArray
 
 
 def epoch_order(
-    n: int, *, seed: int, epoch: int, slice_rows: int, draws: NDArray[np.floating] | None = None
+    n: int,
+    *,
+    seed: int,
+    epoch: int,
+    slice_rows: int,
+    draws: NDArray[np.floating] | None = None,
+    repeat: bool = False,
 ) -> NDArray[np.int64]:
-    """The rows of one epoch, (rows,), each in 0..n-1 and, without ``draws``, at most once.
+    """The rows of one epoch, (rows,), each in 0..n-1 and, without ``draws`` and ``repeat``, at most once.
 
     The paper's slices: all rows are shuffled once and cut into slices; each epoch takes the next slice, round robin,
-    and shuffles it again. The slices are as many as ``slice_rows`` asks for at least and of equal length (± 1), so
-    that none is a small rest. With ``draws`` each round over the slices begins with drawing its rows anew.
+    and shuffles it again. The slices are of equal length (± 1), so that none is a small rest, and as near to
+    ``slice_rows`` as that allows. With ``draws`` each round over the slices begins with drawing its rows anew.
 
     Args:
         n: number of rows.
         seed: of both shuffles.
         epoch: from 0.
-        slice_rows: the longest that a slice may be.
+        slice_rows: how long a slice should be.
         draws: (n,) how often each row is to come in a round, on average over the rounds; in one round it comes that
             often rounded down or up. Their sum, rounded, is the number of rows of a round.
+        repeat: of r times fewer rows than a slice should have an epoch takes sqrt(r) rounds, rounded, half way between
+            as many passes and as many steps as with enough of them.
     """
     rows = _shuffled(n, seed)
     total = n if draws is None else max(1, round(float(draws.sum(dtype=np.float64))))
-    slices = max(1, -(-total // slice_rows))
+    slices = max(1, round(total / slice_rows))
+    rounds = max(1, round((slice_rows / total) ** 0.5)) if repeat else 1
     turn, index = divmod(epoch, slices)
-    if draws is not None:
-        rows = _drawn(rows, draws[rows], total, offset=np.random.default_rng((seed, 3, turn)).random())
-    part = rows[index * total // slices : (index + 1) * total // slices]
-    return np.random.default_rng((seed, 1, epoch)).permutation(part).astype(np.int64)
+    random = np.random.default_rng((seed, 1, epoch))
+    parts = []
+    for number in range(turn * rounds, (turn + 1) * rounds):
+        drawn = rows
+        if draws is not None:
+            drawn = _drawn(rows, draws[rows], total, offset=np.random.default_rng((seed, 3, number)).random())
+        parts.append(random.permutation(drawn[index * total // slices : (index + 1) * total // slices]))
+    return np.concatenate(parts).astype(np.int64)
 
 
 def epoch_mirrored(n: int, *, seed: int, epoch: int, share: float) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from teamclone.models import mixture
 from teamclone.models.kicks import Kicks
 from teamclone.models.loss import Balance, Loss, ParameterLoss, mixture_loss, on, point_loss
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_PLACE, LEAST_POWER, Mixture, wrap
-from teamclone.models.relative import geometry_of
+from teamclone.models.relative import geometry_of, tackle_of
 from teamclone.models.state import Target
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CLONED, parameters_of
@@ -224,6 +224,7 @@ class MixtureHead(nn.Module):
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
         self.kick = Kicks(kick_width, target_width, planned=planned)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
+        self.planned_tackle = nn.Linear(kick_width, 1) if planned else None
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
         self.powers = nn.Parameter(torch.linspace(0.0, 100.0, FREE))
         self.catch = nn.Linear(parameter_width, CATCH_DIRECTIONS) if "catch" in commands else None
@@ -305,6 +306,10 @@ class MixtureHead(nn.Module):
         """As the situation is and from its mirror: what is right on the left is right on the right."""
         both = self.kick(situation.kick, situation.kick_geometry, situation.targets)
         tackle = self.tackle(situation.kick).float()
+        if self.planned_tackle is not None:
+            there, degrees = tackle_of(situation.kick_geometry).unbind(1)
+            trust = there[:, None] * self.planned_tackle(situation.kick).float()
+            tackle = tackle.scatter_add(1, class_of(degrees, TACKLE_DIRECTIONS)[:, None], trust)
         (power, power_mirrored), (direction, direction_mirrored) = (mixture.halves(part) for part in both)
         # Class k lies at k steps, its mirror at -k.
         opposite = torch.remainder(-torch.arange(TACKLE_DIRECTIONS, device=tackle.device), TACKLE_DIRECTIONS)

@@ -82,7 +82,9 @@ whether he keeps the goal. All 0 where he is not.
 
 WAY = tuple(f"{name}_{what}" for name in WAYS for what in ("there", "vx", "vy"))
 """Of each way to kick that a plan knows: whether there is one, and the velocity of the ball, metres per cycle."""
-SIDED = frozenset(f"{name}_vy" for name in WAYS)
+TACKLE = ("tackle_there", "tackle_degrees")
+"""Whether he may tackle the ball, and where to a plan says, degrees from his body."""
+SIDED = frozenset((*(f"{name}_vy" for name in WAYS), "tackle_degrees"))
 
 
 def geometry_of(geometry: Tensor, *names: str) -> list[Tensor]:
@@ -106,12 +108,18 @@ def ways_of(geometry: Tensor) -> Tensor:
     return geometry[:, -len(WAY) :].reshape(-1, len(WAYS), 3)
 
 
+def tackle_of(geometry: Tensor) -> Tensor:
+    """(batch, 2) TACKLE of such features."""
+    return geometry[:, -len(WAY) - len(TACKLE) : -len(WAY)]
+
+
 class RelativeFeatures(nn.Module):
-    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is; WAY with the block ``plan``.
+    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is; TACKLE and WAY with the
+    block ``plan``.
 
     Args:
         blocks: some of BLOCKS; ``scene`` is always among the columns.
-        others: have OTHER of all OTHERS, as they are, between GEOMETRY and WAY.
+        others: have OTHER of all OTHERS, as they are, right after GEOMETRY.
     """
 
     signs: Tensor
@@ -134,7 +142,7 @@ class RelativeFeatures(nn.Module):
             *(f"{name}_{i}" for name in ("scene", *self.blocks) for i in range(parts[name].shape[1])),
             *GEOMETRY,
             *(f"other_{i}_{name}" for i in range(OTHERS if others else 0) for name in OTHER),
-            *(WAY if "plan" in self.blocks else ()),
+            *((*TACKLE, *WAY) if "plan" in self.blocks else ()),
         )
         self.n_inputs = self.names.index(GEOMETRY[0])
         self.normalisation = Normalisation(self.n_inputs)
@@ -168,7 +176,7 @@ class RelativeFeatures(nn.Module):
         self.normalisation.mean[self.signs[: self.n_inputs] < 0] = 0.0
 
     def normalise(self, columns: Tensor) -> Tensor:
-        """(batch, len(names)) of what `project` gives; GEOMETRY, OTHER and WAY stay."""
+        """(batch, len(names)) of what `project` gives; GEOMETRY and what follows stay."""
         inputs, geometry = columns[:, : self.n_inputs], columns[:, self.n_inputs :]
         return torch.cat([self.normalisation(inputs).clamp(-CLIP, CLIP), geometry], dim=1)
 
@@ -410,7 +418,7 @@ def _last(players: Tensor, actor: Tensor) -> Tensor:
 
 
 def _plan(state: State) -> tuple[Tensor, Tensor]:
-    """What is planned with the ball, (batch, columns), and WAY; zeros for who cannot kick it."""
+    """What is planned with the ball, (batch, columns), zeros for who cannot kick it; TACKLE and WAY."""
     made = plans(state)
     column = {name: made[:, index, None] for index, name in enumerate(PLAN)}
     worths = torch.cat([column[f"{name}_worth"] for name in WORTHS], 1)
@@ -424,7 +432,7 @@ def _plan(state: State) -> tuple[Tensor, Tensor]:
         value = column[f"underway_{name}"]
         # What misses by centimetres was meant, what misses by more was not.
         seen += [value / 20] if name.endswith("dashes") else [value, (value * 5).clamp(max=1.0)]
-    return torch.cat(seen, 1), torch.cat([column[name] for name in WAY], 1)
+    return torch.cat(seen, 1), torch.cat([column[name] for name in (*TACKLE, *WAY)], 1)
 
 
 def _ball(ball: Tensor, view: _View, motion: Tensor, *, areas: Tensor) -> Tensor:

@@ -19,6 +19,7 @@ CHECKPOINT = "best-loss"
 SETTINGS = (
     "data.batch_size=1024",
     "data.batches_per_epoch=300",
+    "data.repeat=false",
     "train.epochs=8",
     "train.learning_rate=5e-4",
     "train.schedule=cosine",

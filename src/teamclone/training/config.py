@@ -22,7 +22,8 @@ class DataConfig:
 
     Attributes:
         batch_size: samples in a batch.
-        batches_per_epoch: longest slice of the training samples that an epoch takes, in batches.
+        batches_per_epoch: about how long a slice of the training samples an epoch takes, in batches.
+        repeat: an epoch of fewer samples goes through them more than once, see `dataset.order`.
         validation_batches: validation samples that are looked at after each epoch, in batches; 0 takes all.
         keep_gb: memory for inputs that cost more to make than a training step, the relative ones, so that they are made
             once; where they do not fit they are made anew for each batch.
@@ -31,6 +32,7 @@ class DataConfig:
 
     batch_size: int = 4096
     batches_per_epoch: int = 300
+    repeat: bool = False
     validation_batches: int = 200
     keep_gb: float = 8.0
     mirror: float = 0.0

@@ -158,6 +158,7 @@ def train(
                 epoch=epoch - 1,
                 slice_rows=config.data.batches_per_epoch * batch_size,
                 draws=None if draws is None else draws[kinds],
+                repeat=config.data.repeat,
             )
             order, mirrored = rows[chosen], None
             if config.data.mirror:

@@ -11,13 +11,25 @@ SIZES = st.integers(1, 400)
 
 @given(n=SIZES, slice_rows=SIZES, seed=st.integers(0, 3), first_round=st.integers(0, 2))
 def test_one_round_of_slices_is_every_row_once(n: int, slice_rows: int, seed: int, first_round: int) -> None:
-    slices = -(-n // slice_rows)
+    slices = max(1, round(n / slice_rows))
     epochs = range(first_round * slices, (first_round + 1) * slices)
     parts = [epoch_order(n, seed=seed, epoch=epoch, slice_rows=slice_rows) for epoch in epochs]
     assert np.array_equal(np.sort(np.concatenate(parts)), np.arange(n))
     lengths = [len(part) for part in parts]
-    assert max(lengths) <= slice_rows
+    assert max(lengths) < 1.5 * slice_rows + 1
+    assert n < slice_rows or min(lengths) > 0.66 * slice_rows - 1
     assert max(lengths) - min(lengths) <= 1
+
+
+@given(n=SIZES, slice_rows=SIZES, seed=st.integers(0, 3), epoch=st.integers(0, 5))
+def test_too_few_rows_are_repeated(n: int, slice_rows: int, seed: int, epoch: int) -> None:
+    once, more = (
+        epoch_order(n, seed=seed, epoch=epoch, slice_rows=slice_rows, repeat=repeat) for repeat in (False, True)
+    )
+    times = max(1, round((slice_rows / n) ** 0.5))
+    assert np.array_equal(more[: len(once)], once)
+    assert len(more) == times * len(once)
+    assert np.array_equal(np.bincount(more, minlength=n), times * np.bincount(once, minlength=n))
 
 
 @given(n=SIZES, slice_rows=SIZES, epoch=st.integers(0, 20))
@@ -46,14 +58,13 @@ DRAWS = st.lists(st.floats(0.01, 6), min_size=1, max_size=200)
 @given(draws=DRAWS, slice_rows=SIZES, turn=st.integers(0, 3))
 def test_a_round_has_every_row_as_often_as_asked(draws: list[float], slice_rows: int, turn: int) -> None:
     total = max(1, round(sum(draws)))
-    slices = -(-total // slice_rows)
+    slices = max(1, round(total / slice_rows))
     parts = [
         epoch_order(len(draws), seed=0, epoch=epoch, slice_rows=slice_rows, draws=np.array(draws))
         for epoch in range(turn * slices, (turn + 1) * slices)
     ]
     lengths = [len(part) for part in parts]
     assert sum(lengths) == total
-    assert max(lengths) <= slice_rows
     assert max(lengths) - min(lengths) <= 1
     count = np.bincount(np.concatenate(parts), minlength=len(draws))
     wanted = np.array(draws) * total / sum(draws)
@@ -68,6 +79,15 @@ def test_over_the_rounds_all_rows_are_drawn_as_often_as_asked() -> None:
     assert np.abs(mean - draws).max() < 0.12
     again = epoch_order(300, seed=0, epoch=7, slice_rows=360, draws=draws)
     assert np.array_equal(again, epochs[7])
+
+
+def test_repeated_rows_are_drawn_anew_each_time() -> None:
+    draws = np.repeat([0.1, 0.5, 3.0], 100)
+    order = epoch_order(300, seed=0, epoch=2, slice_rows=360 * 9, draws=draws, repeat=True)
+    rounds = np.split(order, 3)
+    assert len(order) == 3 * 360
+    assert not np.array_equal(np.sort(rounds[0]), np.sort(rounds[1]))
+    assert np.abs(np.bincount(order, minlength=300) / 3 - draws).max() < 1
 
 
 def test_of_an_epoch_the_wanted_share_is_mirrored() -> None:

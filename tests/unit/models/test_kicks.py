@@ -11,6 +11,7 @@ import torch
 from tests.situations import situations
 
 from teamclone.models.config import ModelConfig
+from teamclone.models.heads import TACKLE_DIRECTIONS, MixtureHead, class_of
 from teamclone.models.kicks import (
     AHEAD_M,
     BALL_SPEED_MAX,
@@ -26,7 +27,7 @@ from teamclone.models.kicks import (
 from teamclone.models.mirror import mirror_state, mirror_target
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
 from teamclone.models.network import Clone
-from teamclone.models.planning.plan import WAYS
+from teamclone.models.planning.plan import PLAN, WAYS, plans
 from teamclone.models.relative import GEOMETRY, MATES
 from teamclone.models.state import State, Target
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
@@ -259,3 +260,28 @@ def test_the_single_answer_is_mirrored(model: Clone) -> None:
         away = wrap((values + others) * DEGREE) / DEGREE if parameter.angle else values - others
         # Of two components that are as near to the median rounding may take either.
         assert (away.abs() < 0.5).float().mean() > 0.95, parameter.name
+
+
+def test_a_planned_tackle_is_trusted_as_far_as_training_says() -> None:
+    torch.manual_seed(0)
+    model = Clone(replace(MODEL, kick_blocks=("ball", "plan"))).eval()
+    state = situations(300, seed=5)
+    made = plans(state)
+    there, degrees = made[:, PLAN.index("tackle_there")] > 0, made[:, PLAN.index("tackle_degrees")]
+    assert there.sum() > 10
+    head = model.head
+    assert isinstance(head, MixtureHead)
+    assert head.planned_tackle is not None
+    place = [parameter.name for parameter in PARAMETERS].index("tackle_direction")
+    with torch.no_grad():
+        head.planned_tackle.weight.zero_()
+        doubted = model.predict(state)[1][:, place]
+        head.planned_tackle.bias.fill_(30.0)
+        trusted = model.predict(state)[1][:, place]
+        answers = model.output(state).kick
+    # On the left as on the right.
+    for answer in answers:
+        assert torch.equal(answer.tackle.argmax(1)[there], class_of(degrees, TACKLE_DIRECTIONS)[there])
+    assert (wrap((trusted - degrees)[there] * DEGREE).abs() < 1e-4).all()
+    assert torch.equal(trusted[~there], doubted[~there])
+    assert (wrap((doubted - degrees)[there] * DEGREE).abs() > 0.1).float().mean() > 0.5

@@ -136,10 +136,15 @@ def most_turn(player: Array, speed: float) -> float:
 @kernel
 def turns(player: Array, toward: float, metres: float, near_m: float) -> int:
     """How many turns until he faces a place so far away, in this direction, to within what ``near_m`` leaves."""
+    return turns_over(player, abs(turned(toward - player[BODY])), metres, near_m)
+
+
+@kernel
+def turns_over(player: Array, left: float, metres: float, near_m: float) -> int:
+    """The same over so many degrees."""
     margin = 180.0
     if near_m < metres:
         margin = max(TURN_MARGIN_DEG, math.degrees(math.asin(near_m / metres)))
-    left = abs(turned(toward - player[BODY]))
     speed = math.hypot(player[VX], player[VY])
     count = 0
     while left > margin and count < RUN:

@@ -1,7 +1,8 @@
-"""The plan of who has the ball: all ways to go on, what each is worth, and which an agent of HELIOS Base takes.
+"""The plan of who is at the ball: all ways to go on, what each is worth, and which an agent of HELIOS Base takes.
 
 Who can score shoots; who has an opponent at the ball hits it towards the goal; else the best of passes, dribbles and
 runs that no opponent reaches in time is taken, if it is worth more than where the ball is, which is held otherwise.
+Of who may tackle the ball the plan says where to.
 This and all numbers are as agents of HELIOS Base and its library librcsc act (Akiyama et al.,
 github.com/helios-base), from their public sources and the logs; the code is our own.
 """
@@ -34,6 +35,8 @@ from teamclone.models.planning.bodies import (
     OFFSIDE,
     OPPONENT,
     RECEIVES,
+    TACKLE_M,
+    TACKLE_WIDTH_M,
     TACKLING,
     THERE,
     Array,
@@ -62,6 +65,7 @@ from teamclone.models.planning.passes import (
     best_pass,
 )
 from teamclone.models.planning.shots import best_shot
+from teamclone.models.planning.tackling import best_tackle, can_tackle
 from teamclone.models.planning.worth import worth
 from teamclone.models.state import CHANNEL, State
 from teamclone.rcss import pitch
@@ -86,16 +90,20 @@ PLAN = (
     "pass_kicks",
     "pass_cycles",
     *(f"underway_{name}" for name in UNDERWAY),
+    "tackle_there",
+    "tackle_degrees",
     *(f"{name}_{axis}" for name in WAYS for axis in ("vx", "vy")),
 )
-"""What `plans` gives; all 0 but for who can kick the ball. WORTHS are metres beyond the best of the others, at most
-FAR_M; velocities those of the ball after the kick, metres per cycle on the pitch."""
+"""What `plans` gives; all 0 but for who can kick the ball, and ``tackle_`` for who can tackle it, 0 for others. WORTHS
+are metres beyond the best of the others, at most FAR_M; velocities those of the ball after the kick, metres per cycle
+on the pitch; degrees are from his body."""
 FAR_M = 20.0
-NEAR_BALL_M = 2.0
-"""More than any player reaches."""
+NEAR_BALL_M = math.hypot(TACKLE_M, TACKLE_WIDTH_M)
+"""More than any player reaches, and farther than any tackle."""
 _WAY = PLAN.index("shot_vx")
 """Where the velocities begin."""
 _THERE, _WORTH, _UNDERWAY = PLAN.index("shot_there"), PLAN.index("pass_worth"), PLAN.index("underway_dribble_m")
+_TACKLE = PLAN.index("tackle_there")
 ENOUGH_SHOT, ENOUGH_PASS = 0.99, 0.96
 """Parts of the wanted speed that will do."""
 FORWARD_X, FORWARD_DEG, FREE_M = 42.0, 110.0, 4.0
@@ -153,19 +161,14 @@ def _free(scene: Array) -> bool:
 
 
 @kernel
-def _complete(scene: Array, actor: int) -> bool:
-    """Fill what of a scene follows from who has the ball; whether he can kick it."""
-    ball, me = scene[BALL], scene[actor]
-    if not np.isfinite(scene).all():  # whatever a log may hold
-        return False
+def _complete(scene: Array, actor: int) -> None:
+    """Fill what of a scene follows from who can kick the ball."""
+    ball, me = scene[BALL], scene[ME]
     own_m = gap(ball[0], ball[1], me[X], me[Y])
-    if me[THERE] == 0 or own_m > me[AREA]:
-        return False
     ball[GAIN] = kick_rate(me, own_m, direction(ball[0] - me[X], ball[1] - me[Y]) - me[BODY])
     first, second = 0.0, 0.0
-    for player in range(BALL):
-        prepare(scene[player])
-        if player >= OPPONENT and scene[player, THERE] > 0:
+    for player in range(OPPONENT, BALL):
+        if scene[player, THERE] > 0:
             x = scene[player, X]
             first, second = max(first, x), max(second, min(first, x))
     ball[OFFSIDE] = max(second, ball[0])
@@ -175,19 +178,11 @@ def _complete(scene: Array, actor: int) -> bool:
         away = gap(player[X], player[Y], ball[0], ball[1])
         there = mate != actor and player[TACKLING] == 0 and not back
         player[RECEIVES] = there and player[X] <= ball[OFFSIDE] and away <= FARTHEST_M
-    scene[ME] = me
-    return True
 
 
 @kernel
-def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> None:
-    """Fill PLAN of one scene.
-
-    Args:
-        scene: (ROWS, COLUMNS) as of `described`. order: as of `paths`. made: (len(PLAN),) zeros.
-    """
-    if not _complete(scene, actor):
-        return
+def _plan_with_ball(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> None:
+    """As of `plan`, for who can kick the ball."""
     me, ball = scene[ME], scene[BALL]
     own_m = gap(ball[0], ball[1], me[X], me[Y])
     contested, left = False, False
@@ -258,6 +253,30 @@ def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> Non
     else:
         choice = _TURN if turns else _HOLD
     made[1 + choice] = 1.0
+
+
+@kernel
+def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> None:
+    """Fill PLAN of one scene.
+
+    Args:
+        scene: (ROWS, COLUMNS) as of `described`. order: as of `paths`. made: (len(PLAN),) zeros.
+    """
+    if scene[actor, THERE] == 0 or not np.isfinite(scene).all():  # whatever a log may hold
+        return
+    me, ball = scene[actor], scene[BALL]
+    able = gap(ball[0], ball[1], me[X], me[Y]) <= me[AREA]
+    tackles = can_tackle(me, ball)
+    if not able and not tackles:
+        return
+    for player in range(BALL):
+        prepare(scene[player])
+    scene[ME] = me
+    if able:
+        _complete(scene, actor)
+        _plan_with_ball(scene, actor, order, made)
+    if tackles:
+        made[_TACKLE], made[_TACKLE + 1] = 1.0, best_tackle(scene)
     if not np.isfinite(made).all():  # a player whom no server makes: of a type, say, that never slows down
         made[:] = 0.0
 

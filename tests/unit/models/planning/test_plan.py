@@ -78,7 +78,14 @@ def test_who_cannot_kick_plans_nothing() -> None:
     able = made[:, 0] > 0
     assert 20 < int(able.sum()) < 150
     assert (away[able] <= AREA + 0.1).all()
-    assert (made[~able] == 0).all()
+    there, degrees = PLAN.index("tackle_there"), PLAN.index("tackle_degrees")
+    tackles = made[:, there] > 0
+    assert 10 < int(tackles.sum()) < 150
+    assert (tackles & ~able).any()
+    assert (away[tackles] < NEAR_BALL_M).all()
+    assert (made[~tackles, degrees] == 0).all()
+    others = [index for index in range(len(PLAN)) if index not in (there, degrees)]
+    assert (made[~able][:, others] == 0).all()
     assert (made[able][:, 1 : 1 + len(CHOICES)].sum(1) == 1).all()
     assert torch.isfinite(made).all()
     # One at a time they are the same.
@@ -273,11 +280,66 @@ def test_a_mirrored_plan_is_the_plan_mirrored() -> None:
     """Mostly: agents go round the places beside a team mate one way, and stop at the first that is another's."""
     state = situations(900, seed=11)
     made, turned = plans(state), plans(mirror_state(state, torch.arange(22)))
-    sided = torch.tensor([-1.0 if name.endswith("_vy") else 1.0 for name in PLAN])
+    sided = torch.tensor([-1.0 if name.endswith(("_vy", "_degrees")) else 1.0 for name in PLAN])
+    degrees = PLAN.index("tackle_degrees")
+    around = (made[:, degrees] + turned[:, degrees] + 180) % 360 - 180
+    assert (around == 0).float().mean() > 0.95
+    made[:, degrees] = turned[:, degrees] = 0
     able = made[:, 0] > 0
     assert torch.equal(able, turned[:, 0] > 0)
     alike = torch.isclose(made[able] * sided, turned[able], atol=1e-3).all(1)
     assert alike.float().mean() > 0.6
+
+
+def tackled(state: State) -> tuple[float, float]:
+    """Velocity of the ball after the planned tackle, which succeeds (rcssserver `player.cpp`, tackle)."""
+    made = planned(state)
+    assert made["tackle_there"]
+    body = float(state.players[0, 0, CHANNEL["body"]])
+    x, y, vx, vy = (state.ball[0] - torch.cat([state.players[0, 0, :2], torch.zeros(2)])).tolist()
+    off = abs((math.degrees(math.atan2(y, x)) - body + 180) % 360 - 180) / 180
+    push = 2.7 * (1 - abs(made["tackle_degrees"]) / 180) * (1 - 0.5 * off)
+    angle = math.radians(body + made["tackle_degrees"])
+    return vx + push * math.cos(angle), vy + push * math.sin(angle)
+
+
+@pytest.mark.parametrize("body", [-30.0, 0.0, 45.0])
+def test_a_tackle_before_the_goal_is_a_shot(body: float) -> None:
+    at = math.radians(body)
+    state = scene(x=40.0, y=3.0, body=body, ball=(1.5 * math.cos(at), 1.5 * math.sin(at), 0.2, 0.3))
+    vx, vy = tackled(state)
+    x, y = state.ball[0, :2].tolist()
+    assert vx / (1 - 0.94) > 52.5 - x
+    assert abs(y + vy / vx * (52.5 - x)) < 7.01
+
+
+def test_a_tackle_goes_where_no_opponent_is() -> None:
+    """Else towards the nearer side line; with the own goal behind him never into it."""
+    state = scene(y=10.0, ball=(1.5, 0.0, 0.0, 0.0))
+    vx, vy = tackled(state)
+    assert vy > 0.9 * abs(vx)
+    for place in range(11, 22):
+        put(state, place, x=0.5 * (place - 16), y=24.0, body=-90.0)
+    assert tackled(state)[1] < 0.5 * vy
+    back = scene(x=-45.0, body=180.0, ball=(-1.5, 0.0, 0.0, 0.0))
+    x, y = back.ball[0, :2].tolist()
+    vx, vy = tackled(back)
+    assert vx >= 0 or abs(y + vy / vx * (-52.5 - x)) > 8.01
+
+
+def test_who_is_lying_is_late() -> None:
+    state = scene(y=10.0, ball=(1.5, 0.0, 0.0, 0.0))
+    for place in range(11, 22):
+        put(state, place, x=0.5 * (place - 16), y=24.0, body=-90.0)
+    before = planned(state)["tackle_degrees"]
+    for place in range(11, 22):
+        put(state, place, flags=FLAG_ON_FIELD | FLAG_TACKLING)
+    assert planned(state)["tackle_degrees"] != before
+
+
+@pytest.mark.parametrize("ball", [(-0.5, 1.2), (2.01, 0.0), (1.0, 1.26), (1.99, 1.0)])
+def test_no_tackle_at_a_ball_behind_or_out_of_reach(ball: tuple[float, float]) -> None:
+    assert planned(scene(ball=(*ball, 0.0, 0.0)))["tackle_there"] == 0
 
 
 def test_worths_tell_the_best() -> None:
@@ -315,3 +377,9 @@ def test_agents_of_real_matches_do_as_planned(samples_dir: Path, tmp_path: Path)
     right = exact.gather(1, taken.clamp(min=0)[:, None])[:, 0] & (taken >= 0)
     assert right.float().mean() > 0.8
     assert exact.any(1).float().mean() > 0.85
+    rows = torch.nonzero(target.kind == CLONED_KINDS.index(CommandKind.TACKLE))[:, 0]
+    assert len(rows) > 10
+    made = plans(data.state(rows.numpy()))
+    assert (made[:, PLAN.index("tackle_there")] > 0).all()
+    away = target.parameters[rows, 0] - made[:, PLAN.index("tackle_degrees")]
+    assert (((away + 180) % 360 - 180).abs() < 1.0).float().mean() > 0.8

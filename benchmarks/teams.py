@@ -26,7 +26,7 @@ from teamclone.training.config import load_config
 from teamclone.training.run import open_run
 
 BASE = "all of them"
-COUNTS = (1, 2, 3, 5, 10)
+COUNTS = (1, 3, 10)
 OF_TWO = ("accuracy", "cross-entropy, nats")
 HEADERS = (
     "clone of", "training matches", "samples", "minutes", "test matches", "rows", "accuracy", "cross-entropy, nats",

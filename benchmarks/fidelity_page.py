@@ -315,6 +315,18 @@ class probabilities of balanced trainings are corrected for the balance unless `
 is off. `ensemble` trains three networks side by side."""
 
 
+KICKS_TEXT = {
+    "short": "`short` is the preset `best` on the shorter schedule.",
+    "without-plan": "`without-plan` tells nothing of what is planned.",
+    "plan-of-kicks": "`plan-of-kicks` tells what is planned to the layers of a kick alone.",
+    "without-attention": """In `without-attention` the layers of a kick know of the others only what is planned and
+the two nearest of each side to the ball.""",
+    "without-kicks": "`without-kicks` shows none beside the batches.",
+    "plain": """`plain` knows of no plan, and the other players as lists of the nearest; it is trained by Adam on samples
+as they are, without kicks beside the batches.""",
+}
+
+
 def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
     """Of step k."""
     made = [name for name in ("short", *variants, "plain") if name in results]
@@ -343,10 +355,7 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
     return f"""## Kicks
 
 Where kicks go, and how hard, by what is known of plans with the ball, of the other players, and by how often kicks are
-shown. `short` is the preset `best` on the shorter schedule. `plan-of-kicks` tells what is planned to the layers of a
-kick alone, `without-plan` to none. In `without-attention` the layers of a kick know of the others only what is
-planned and the two nearest of each side to the ball. `plain` knows of no plan, and the other players as lists of the
-nearest; it is trained by Adam on samples as they are, without kicks beside the batches.
+shown. {" ".join(KICKS_TEXT[name] for name in made if name in KICKS_TEXT)}
 
 {table(headers, rows)}"""
 

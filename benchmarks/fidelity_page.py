@@ -322,8 +322,8 @@ KICKS_TEXT = {
     "without-attention": """In `without-attention` the layers of a kick know of the others only what is planned and
 the two nearest of each side to the ball.""",
     "without-kicks": "`without-kicks` shows none beside the batches.",
-    "plain": """`plain` knows of no plan, and the other players as lists of the nearest; it is trained by Adam on samples
-as they are, without kicks beside the batches.""",
+    "plain": """`plain` knows of no plan, and the other players as lists of the nearest; it is trained by Adam on
+samples as they are, without kicks beside the batches.""",
 }
 
 

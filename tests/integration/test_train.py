@@ -217,6 +217,7 @@ REMEDIES = (
 )
 BASES: dict[str, Sequence[str]] = {
     "paper": (),
+    "few": ("data.batches_per_epoch=50",),
     "relative": RELATIVE,
     "weights": ("train.balance=weights",),
 }
@@ -242,6 +243,7 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "model.members": ("paper", ["model.members=2"]),
     "data.batch_size": ("paper", ["data.batch_size=32"]),
     "data.batches_per_epoch": ("paper", ["data.batches_per_epoch=2"]),
+    "data.repeat": ("few", ["data.repeat=true"]),
     "data.validation_batches": ("paper", ["data.validation_batches=1"]),
     "data.mirror": ("paper", ["data.mirror=0.5"]),
     "train.epochs": ("paper", ["train.epochs=1"]),

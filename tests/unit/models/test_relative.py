@@ -25,6 +25,7 @@ from teamclone.models.relative import (
     NEAREST_OPPONENTS,
     PAST_FRAMES,
     RIVALS,
+    TACKLE,
     WAY,
     RelativeFeatures,
 )
@@ -72,7 +73,7 @@ def test_names_are_the_columns_and_unique() -> None:
         projected = features.project(situations(3, history=features.history))
         assert projected.shape == (3, len(features.names))
         assert len(set(features.names)) == len(features.names)
-        assert features.names[features.n_inputs :] == (*GEOMETRY, *(WAY if "plan" in blocks else ()))
+        assert features.names[features.n_inputs :] == (*GEOMETRY, *((*TACKLE, *WAY) if "plan" in blocks else ()))
         assert {name.rpartition("_")[0] for name in features.names[: features.n_inputs]} == {"scene", *blocks}
 
 

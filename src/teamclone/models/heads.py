@@ -13,6 +13,7 @@ from teamclone.models import mixture
 from teamclone.models.kicks import Kicks
 from teamclone.models.loss import Balance, Loss, ParameterLoss, mixture_loss, on, point_loss
 from teamclone.models.mixture import DEGREE, LEAST_ANGLE, LEAST_PLACE, LEAST_POWER, Mixture, wrap
+from teamclone.models.planning import tackling
 from teamclone.models.relative import geometry_of, tackle_of
 from teamclone.models.state import Target
 from teamclone.rcss import pitch
@@ -24,7 +25,7 @@ FREE = 4
 """Components of dash power and turn moment that hang on nothing."""
 DASH_DIRECTIONS = 24
 """Classes of dash direction, 15 degrees apart."""
-TACKLE_DIRECTIONS = 40
+TACKLE_DIRECTIONS = tackling.DIRECTIONS
 """Classes of tackle direction, 9 degrees apart."""
 CATCH_DIRECTIONS = 40
 """Classes of catch direction, 9 degrees apart."""

@@ -65,6 +65,7 @@ def test_a_round_has_every_row_as_often_as_asked(draws: list[float], slice_rows:
     ]
     lengths = [len(part) for part in parts]
     assert sum(lengths) == total
+    assert max(lengths) < 1.5 * slice_rows + 1
     assert max(lengths) - min(lengths) <= 1
     count = np.bincount(np.concatenate(parts), minlength=len(draws))
     wanted = np.array(draws) * total / sum(draws)

@@ -209,6 +209,11 @@ def tackle_chance(ahead: float, aside: float, exponent: float) -> float:
 
 
 @kernel
+def bell(value: float, width: float) -> float:
+    return math.exp(-0.5 * (value / width) ** 2)
+
+
+@kernel
 def gap(x: float, y: float, at_x: float, at_y: float) -> float:
     """Metres between two places."""
     return math.hypot(x - at_x, y - at_y)

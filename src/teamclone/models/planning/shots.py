@@ -23,6 +23,7 @@ from teamclone.models.planning.bodies import (
     Array,
     X,
     Y,
+    bell,
     coasted,
     cycles_over,
     direction,
@@ -136,9 +137,9 @@ def best_shot(scene: Array) -> tuple[float, float, float, float]:
                 value = 1.0 + 50.0 * (speed <= one + 0.001) + 100.0 * ((late & 1) + (late >> 1))
                 if keeper >= 0:
                     width = KEEPER_LATE_DEG if late & KEEPER_LATE else KEEPER_DEG
-                    value *= 1.0 - math.exp(-0.5 * (turned(angle - keeper_at) / width) ** 2)
+                    value *= 1.0 - bell(turned(angle - keeper_at), width)
                 if metres > FAR_M:
-                    value *= math.exp(-0.5 * (max(0.0, abs(y) - WIDE_Y) / (GOAL_Y - INSIDE_MOST_M)) ** 2)
+                    value *= bell(max(0.0, abs(y) - WIDE_Y), GOAL_Y - INSIDE_MOST_M)
                 if value > best:
                     best, best_y, best_speed, best_one = value, y, speed, one
                 last |= late == KEEPER_LATE + OTHERS_LATE

@@ -24,6 +24,7 @@ from teamclone.models.planning.bodies import (
     Array,
     X,
     Y,
+    bell,
     beside,
     coasted,
     cycles_over,
@@ -53,11 +54,6 @@ SHOT_M = 20.0
 GOAL_DEG, LINE_M, LATE_CYCLES = 40.0, 0.7 * pitch.HALF_WIDTH, 30.0
 """Widths of the bells by which it is worse to hit the ball towards the own goal, worse towards the middle, and worse to
 where opponents soon are."""
-
-
-@kernel
-def _bell(value: float, width: float) -> float:
-    return math.exp(-0.5 * (value / width) ** 2)
 
 
 @kernel
@@ -138,21 +134,21 @@ def _value(scene: Array, coasting: Array, vx: float, vy: float) -> float:
     speed = math.hypot(vx, vy)
     cos, sin = (vx / speed, vy / speed) if speed > 0 else (1.0, 0.0)
     end_x = ball[0] + vx / (1.0 - BALL_DECAY)
-    fast = _bell(speed, 0.5 * BALL_SPEED_MAX)
+    fast = bell(speed, 0.5 * BALL_SPEED_MAX)
     if end_x > GOAL_X and math.hypot(ball[0] - GOAL_X, ball[1]) < SHOT_M:
         y = ball[1] + vy / vx * (GOAL_X - ball[0])
         if abs(y) < GOAL_Y:
-            return 1e6 * (1.0 - fast) * _bell(y, 2.0 * GOAL_Y)
+            return 1e6 * (1.0 - fast) * bell(y, 2.0 * GOAL_Y)
     if end_x < -GOAL_X:
         y = ball[1] + vy / vx * (-GOAL_X - ball[0])
         if abs(y) < GOAL_Y + 1.0:
-            return 1e4 * (fast - _bell(abs(y) - GOAL_Y, GOAL_Y))
+            return 1e4 * (fast - bell(abs(y) - GOAL_Y, GOAL_Y))
     cycles = _opponents_after(scene, coasting, speed, cos, sin)
     way_m = min(rolled(speed, cycles), _edge_m(ball[0], ball[1], cos, sin))
     off = turned(direction(-GOAL_X - ball[0], -ball[1]) - direction(vx, vy))
     to_line = max(0.0, pitch.HALF_WIDTH - 0.1 - abs(ball[1] + way_m * sin))
-    aside = _bell(to_line + 0.1, LINE_M) if to_line > 0 else 1.0
-    return 1e4 * (1.0 - _bell(off, GOAL_DEG)) * aside * (1.0 - _bell(cycles, LATE_CYCLES))
+    aside = bell(to_line + 0.1, LINE_M) if to_line > 0 else 1.0
+    return 1e4 * (1.0 - bell(off, GOAL_DEG)) * aside * (1.0 - bell(cycles, LATE_CYCLES))
 
 
 @kernel

@@ -31,9 +31,12 @@ class Features(Protocol):
     """The channels of ``State.players`` that it reads: a log that lacks one of them cannot be used."""
     history: int
     """Frames before the present that it reads."""
+    signs: Tensor
+    """(columns,) -1 for columns that change their sign where left and right are exchanged, else 1."""
 
     def fit(self, chunks: Iterable[Tensor]) -> None: ...
     def project(self, state: State) -> Tensor: ...
+    def counterparts(self, places: Tensor) -> Tensor: ...
     def normalise(self, columns: Tensor) -> Tensor: ...
     def __call__(self, state: State) -> Tensor: ...
 
@@ -82,6 +85,7 @@ class PaperFeatures(nn.Module):
     channels = ("x", "y", "vx", "vy", "body")
     history = 0
     ball_limit: Tensor
+    signs: Tensor
 
     def __init__(self, *, own_type: bool = False, all_types: tuple[str, ...] = ()) -> None:
         super().__init__()
@@ -99,6 +103,22 @@ class PaperFeatures(nn.Module):
         self.normalisation = Normalisation(len(names))
         ball = torch.tensor([pitch.MAX_X, pitch.MAX_Y, LOGGED_BALL_SPEED_MAX, LOGGED_BALL_SPEED_MAX])
         self.register_buffer("ball_limit", ball, persistent=False)
+        sided = [name.rpartition("_")[2] in ("y", "vy", "body") for name in names]
+        self.register_buffer("signs", torch.where(torch.tensor(sided), -1.0, 1.0), persistent=False)
+
+    def counterparts(self, places: Tensor) -> Tensor:
+        """(len(names),) which column holds in the mirror, but for its sign, what this one holds.
+
+        Args:
+            places: as of `mirror.mirror_state`.
+        """
+        column = {name: index for index, name in enumerate(self.names)}
+        order = list(range(len(self.names)))
+        for player, place in zip(PLAYERS, places.tolist(), strict=True):
+            for name, index in column.items():
+                if name.startswith(f"{player}_"):
+                    order[index] = column[PLAYERS[place] + name.removeprefix(player)]
+        return torch.tensor(order)
 
     def project(self, state: State) -> Tensor:
         """(batch, len(names)) before normalisation."""

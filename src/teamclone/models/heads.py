@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
@@ -51,25 +51,34 @@ class Prediction(NamedTuple):
     parameters: Tensor
 
 
+class AtBall(NamedTuple):
+    """What kicks and tackles are decided on, first of the situations as they are, then of the same mirrored.
+
+    Attributes:
+        hidden: (2 * kicks, kick width). geometry: (2 * kicks, columns of geometry).
+        targets: (2 * kicks, TARGETS, width) what `crowd.Crowd` says of those to kick to; None without one.
+    """
+
+    hidden: Tensor
+    geometry: Tensor
+    targets: Tensor | None
+
+
 class Situation(NamedTuple):
     """What a network has made of a state.
 
     Attributes:
         hidden: (batch, width) what the command is decided on.
         parameters: (batch, parameter width) what dashes and turns are.
-        kick, kick_geometry: (2 * kicks, kick width) and (2 * kicks, columns of geometry) what kicks and tackles are,
-            first of the situations as they are, then of the same mirrored.
-        targets: (2 * kicks, TARGETS, width) what `crowd.Crowd` says of those to kick to; None without one.
-        kicks: (kicks,) which situations these are; None for all.
+        at_ball: what kicks and tackles are; nothing where the head does not ask for it, as for ``parameters``.
+        kicks: (kicks,) of which situations; None for all.
         geometry: (batch, at least len(GEOMETRY)).
         bearing, power: (batch, aims) as of `aims.Aims`.
     """
 
     hidden: Tensor
     parameters: Tensor
-    kick: Tensor
-    kick_geometry: Tensor
-    targets: Tensor | None
+    at_ball: AtBall
     kicks: Tensor | None
     geometry: Tensor
     bearing: Tensor
@@ -240,7 +249,7 @@ class MixtureHead(nn.Module):
     def forward(self, situation: Situation) -> Distribution:
         command = self.command(situation.hidden).float()
         dash, turn = (layer(situation.parameters).float() for layer in (self.dash, self.turn))
-        kick = self._kick(situation)
+        kick = self.kicks(situation.at_ball)
         with torch.autocast(command.device.type, enabled=False):
             turned, aim = self._turn(turn, situation)
             return Distribution(
@@ -303,13 +312,13 @@ class MixtureHead(nn.Module):
         x_scale, y_scale = (mixture.scale_of(scale, least=LEAST_PLACE, typical=2.0) for scale in raw[2:])
         return Move(Mixture(logits, x, x_scale), Mixture(logits, y, y_scale))
 
-    def _kick(self, situation: Situation) -> tuple[Kick, Kick]:
+    def kicks(self, seen: AtBall) -> tuple[Kick, Kick]:
         """As the situation is and from its mirror: what is right on the left is right on the right."""
-        both = self.kick(situation.kick, situation.kick_geometry, situation.targets)
-        tackle = self.tackle(situation.kick).float()
+        both = self.kick(*seen)
+        tackle = self.tackle(seen.hidden).float()
         if self.planned_tackle is not None:
-            there, degrees = tackle_of(situation.kick_geometry).unbind(1)
-            trust = there[:, None] * self.planned_tackle(situation.kick).float()
+            there, degrees = tackle_of(seen.geometry).unbind(1)
+            trust = there[:, None] * self.planned_tackle(seen.hidden).float()
             tackle = tackle.scatter_add(1, class_of(degrees, TACKLE_DIRECTIONS)[:, None], trust)
         (power, power_mirrored), (direction, direction_mirrored) = (mixture.halves(part) for part in both)
         # Class k lies at k steps, its mirror at -k.
@@ -387,14 +396,13 @@ class MixtureHead(nn.Module):
         In training each answer on a kick counts by itself, so that it learns as if alone.
         """
         answers = output.kick if self.training else (_mean_kick(output.kick),)
-        kicks = [_kick_likelihood(kick, output, target) for kick in answers]
         aims = mixture.log_likelihood(
             output.aim.logits,
             mixture.angle_terms(output.aim, target.parameters[:, 0], factor=output.turn_factor),
         )
         return mixture_loss(
             output.logits,
-            _chosen(output, target, torch.stack(kicks).mean(0)),
+            _chosen(output, target, answers),
             target,
             aims=torch.where(target.kind == CLONED.index("turn"), aims, 0.0),
             weight=weight,
@@ -404,9 +412,16 @@ class MixtureHead(nn.Module):
         )
 
     @staticmethod
+    def kick_loss(kicks: Sequence[Kick], target: Target, *, of: int) -> Tensor:
+        """That of kicks and tackles alone, summed over them and divided by ``of``; each answer counts by itself."""
+        likelihood = _kick_likelihood(kicks, target.parameters)
+        kind = (target.kind == WITH_BALL[1]).long()
+        return -likelihood.gather(1, kind[:, None]).sum() / of
+
+    @staticmethod
     def log_likelihood(output: Distribution, target: Target) -> Tensor:
         """(batch,) log-likelihood of the parameters of the command given, per unit of power and degree."""
-        return _chosen(output, target, _kick_likelihood(_mean_kick(output.kick), output, target))
+        return _chosen(output, target, [_mean_kick(output.kick)])
 
 
 def with_ball(target: Target) -> Tensor:
@@ -434,17 +449,21 @@ def _spread(values: Tensor, output: Distribution) -> Tensor:
     return values.new_zeros(output.logits.shape[0], *values.shape[1:]).index_copy(0, output.kicks, values)
 
 
-def _kick_likelihood(kick: Kick, output: Distribution, target: Target) -> Tensor:
-    """(batch, 2) log-likelihood of the parameters as those of a kick and of a tackle."""
-    parameters = target.parameters if output.kicks is None else target.parameters[output.kicks]
+def _kick_likelihood(answers: Sequence[Kick], parameters: Tensor) -> Tensor:
+    """(kicks, 2) log-likelihood of (kicks, 2) parameters as those of a kick and of a tackle, the mean of answers."""
     first, second = parameters[:, 0], parameters[:, 1]
-    terms = mixture.power_terms(kick.power, first) + mixture.angle_terms(kick.direction, second)
-    both = [mixture.log_likelihood(kick.power.logits, terms), log_class(kick.tackle, first)]
-    return _spread(torch.stack(both, 1), output)
+    each = []
+    for kick in answers:
+        terms = mixture.power_terms(kick.power, first) + mixture.angle_terms(kick.direction, second)
+        both = [mixture.log_likelihood(kick.power.logits, terms), log_class(kick.tackle, first)]
+        each.append(torch.stack(both, 1))
+    return torch.stack(each).mean(0)
 
 
-def _chosen(output: Distribution, target: Target, kick: Tensor) -> Tensor:
-    """(batch,) log-likelihood of the parameters of the command given; ``kick`` as of `_kick_likelihood`."""
+def _chosen(output: Distribution, target: Target, answers: Sequence[Kick]) -> Tensor:
+    """(batch,) log-likelihood of the parameters of the command given, of a kick as the mean of ``answers``."""
+    of_kicks = target.parameters if output.kicks is None else target.parameters[output.kicks]
+    kick = _spread(_kick_likelihood(answers, of_kicks), output)
     first, second = target.parameters[:, 0], target.parameters[:, 1]
     dash = mixture.log_likelihood(output.dash_power.logits, mixture.power_terms(output.dash_power, first))
     turn = mixture.log_likelihood(
@@ -496,6 +515,14 @@ class EnsembleHead(nn.Module):
     def point(self, outputs: Sequence[Any]) -> Prediction:
         prediction: Prediction = self._first.point(self.merged(outputs))
         return prediction._replace(logits=prediction.logits / self.temperature)
+
+    def kicks(self, seen: Sequence[AtBall]) -> list[tuple[Kick, Kick]]:
+        """As of `MixtureHead`, which its members have to be."""
+        return [cast(MixtureHead, member).kicks(of) for member, of in zip(self.members, seen, strict=True)]
+
+    def kick_loss(self, kicks: Sequence[Sequence[Kick]], target: Target, *, of: int) -> Tensor:
+        """The mean of the members' errors, as of `MixtureHead`."""
+        return torch.stack([self._first.kick_loss(answers, target, of=of) for answers in kicks]).mean()
 
     def log_likelihood(self, outputs: Sequence[Any], target: Target) -> Tensor:
         """As of `MixtureHead`, which its members have to be."""

@@ -13,7 +13,7 @@ from teamclone.models.aims import COLUMNS, Aims, layers
 from teamclone.models.config import ModelConfig
 from teamclone.models.crowd import Crowd
 from teamclone.models.features import Features, PaperFeatures
-from teamclone.models.heads import EnsembleHead, MixtureHead, PointHead, Prediction, Situation
+from teamclone.models.heads import AtBall, EnsembleHead, MixtureHead, PointHead, Prediction, Situation
 from teamclone.models.relative import RelativeFeatures
 from teamclone.models.state import State
 
@@ -60,17 +60,20 @@ class AimedTrunk(nn.Module):
         aims, bearing, power = self.aims(columns.index_select(1, self.aim_columns), geometry)
         seen = torch.cat([columns.index_select(1, self.command_columns), aims], 1)
         hidden = self.command(seen)
-        parameters = kick = both = hidden[:0]
-        targets = None
+        parameters, at_ball = hidden[:0], AtBall(hidden[:0], geometry[:0], None)
         if self.answers:
             parameters = self.parameters_of(torch.cat([seen, hidden], 1).detach())
-            chosen = inputs if kicks is None else inputs.index_select(0, kicks)
-            both = torch.cat([chosen, chosen * self.signs])
-            kick = self.kick(both.index_select(1, self.kick_columns))
-            if self.crowd is not None:
-                together, targets = self.crowd(kick, both[:, self.n_inputs :])
-                kick = torch.cat([kick, together], 1)
-        return Situation(hidden, parameters, kick, both[:, self.n_inputs :], targets, kicks, geometry, bearing, power)
+            at_ball = self.at_ball(inputs if kicks is None else inputs.index_select(0, kicks))
+        return Situation(hidden, parameters, at_ball, kicks, geometry, bearing, power)
+
+    def at_ball(self, inputs: Tensor) -> AtBall:
+        """What kicks and tackles hang on, which is nothing that the other layers find."""
+        both = torch.cat([inputs, inputs * self.signs])
+        kick, geometry, targets = self.kick(both.index_select(1, self.kick_columns)), both[:, self.n_inputs :], None
+        if self.crowd is not None:
+            together, targets = self.crowd(kick, geometry)
+            kick = torch.cat([kick, together], 1)
+        return AtBall(kick, geometry, targets)
 
 
 class Trunks(nn.Module):
@@ -82,6 +85,9 @@ class Trunks(nn.Module):
 
     def forward(self, inputs: Tensor, **options: Any) -> list[Any]:
         return [member(inputs, **options) for member in self.members]
+
+    def at_ball(self, inputs: Tensor) -> list[AtBall]:
+        return [cast(AimedTrunk, member).at_ball(inputs) for member in self.members]
 
 
 class Clone(nn.Module):
@@ -127,6 +133,11 @@ class Clone(nn.Module):
         if kicks is None or self.config.head == "point":
             return self.head(self.trunk(inputs))
         return self.head(self.trunk(inputs, kicks=kicks))
+
+    def kicks(self, inputs: Tensor) -> Any:
+        """What a `MixtureHead` answers on kicks and tackles alone, for its ``kick_loss``."""
+        head, trunk = cast(MixtureHead, self.head), cast(AimedTrunk, self.trunk)
+        return head.kicks(trunk.at_ball(inputs))
 
     def forward(self, state: State) -> Prediction:
         return self.head.point(self.output(state))

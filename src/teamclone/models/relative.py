@@ -16,7 +16,7 @@ from torch.nn import functional
 from teamclone.dataset.layout import FLAG_CHARGED, FLAG_COLLIDED, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.models.config import BLOCKS
 from teamclone.models.features import Normalisation, TypeParameters
-from teamclone.models.mirror import mirror_state
+from teamclone.models.mirror import TEAM, mirror_state
 from teamclone.models.physics import (
     NEVER,
     STEPS,
@@ -156,6 +156,14 @@ class RelativeFeatures(nn.Module):
         # Nobody has the ball in these, so that of what is planned there is nothing to be seen.
         turned |= torch.tensor([name in SIDED for name in self.names])
         return torch.where(turned, -1.0, 1.0)
+
+    def counterparts(self, places: Tensor) -> Tensor:
+        """As of `PaperFeatures`: only the role knows a player by his number."""
+        order = list(range(len(self.names)))
+        if "role" in self.blocks:
+            first = self.names.index("role_0")
+            order[first : first + TEAM] = (first + places[:TEAM]).tolist()
+        return torch.tensor(order)
 
     def columns(self, blocks: tuple[str, ...]) -> list[int]:
         """Places of the columns of ``scene`` and of some blocks."""

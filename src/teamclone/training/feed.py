@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -15,7 +14,7 @@ from torch import Tensor
 from teamclone.dataset.layout import CODE, FLAG_ON_FIELD
 from teamclone.dataset.reader import Dataset
 from teamclone.models.features import PaperFeatures
-from teamclone.models.mirror import mirror_places, mirror_state, mirror_target
+from teamclone.models.mirror import mirror_places, mirror_target
 from teamclone.models.network import Clone
 from teamclone.models.state import Target
 from teamclone.training.gather import Gather
@@ -26,6 +25,8 @@ CARD_SHARE = 0.8
 
 MAKE_ROWS = 8192
 """Samples whose inputs are made at once; bounds memory."""
+CACHE_ROWS = 1024
+"""The same on a processor for inputs that are kept: what one step of it leaves is still in the cache for the next."""
 MEAN_ROWS = 2**17
 """Training samples that mean positions are taken over, evenly spread."""
 
@@ -49,13 +50,14 @@ class Feed:
 
     The paper's inputs are gathered by a compiled pass, one batch ahead. Others, which cost more to make than a training
     step, are made once for all samples and kept in memory, where they fit; else a thread makes them one batch ahead.
-    So are the paper's where samples are mirrored, which the compiled pass does not know. On a GPU the arrays of the
-    dataset lie on the card if they fit there, and all that is done with them is done there.
+    So are the paper's where samples are mirrored, which the compiled pass does not know; a mirror image has the inputs
+    of its sample with other signs, some in other columns. On a GPU the arrays of the dataset lie on the card if they
+    fit there, and all that is done with them is done there.
 
     Args:
         keep_bytes: how much memory kept inputs may take.
         rows: all samples that batches will be asked for.
-        mirrored: those of them that may also be asked for mirrored: the training samples. None where none is.
+        mirrored: samples by which players' counterparts are found, if batches will be asked for mirrored samples.
         on_progress: told how many of them are made, and how many there are.
     """
 
@@ -73,52 +75,45 @@ class Feed:
     ) -> None:
         self.device, self.group, self.features, self.inputs = device, group, model.features, model.inputs
         self.on_card = device.type == "cuda" and dataset.nbytes < CARD_SHARE * torch.cuda.mem_get_info(device)[0]
-        self.places = None if mirrored is None else counterparts(dataset, mirrored).to(device)
+        # Which columns change their place in the mirror, and with which.
+        self.moved = self.order = torch.empty(0, dtype=torch.int64, device=device)
+        if mirrored is not None:
+            order = self.inputs.counterparts(counterparts(dataset, mirrored))
+            self.moved = torch.nonzero(order != torch.arange(len(order))).squeeze(1).to(device)
+            self.order = order.to(device)[self.moved]
         self.dataset = dataset.to(device) if self.on_card else dataset
         self.quick = not self.on_card and type(model.features) is PaperFeatures and mirrored is None
         self._gather: Gather | None = None
-        self._kept: dict[bool, _Kept] = {}
-        asked = {} if self.quick or rows is None else {False: rows}
-        if mirrored is not None:
-            asked[True] = mirrored
-        where = device if self.on_card else torch.device("cpu")
+        self._kept: _Kept | None = None
         if self.on_card:
             keep_bytes = min(keep_bytes, CARD_SHARE * torch.cuda.mem_get_info(device)[0])
-        for mirror, of in asked.items():
-            keep_bytes -= 4 * len(self.inputs.names) * len(of)
-            if keep_bytes < 0:
-                break
-            self._kept[mirror] = _Kept(of, n=len(dataset), columns=len(self.inputs.names), where=where)
-        self._make(on_progress)
-        self.ahead = not self.on_card and (device.type != "cpu" or set(self._kept) != set(asked) or not asked)
+        if not self.quick and rows is not None and 4 * len(self.inputs.names) * len(rows) <= keep_bytes:
+            self._kept = self._keep(rows, on_progress)
+        self.ahead = not self.on_card and (device.type != "cpu" or self._kept is None)
 
-    def _make(self, on_progress: Callable[[int, int], None]) -> None:
-        """Fill what is kept."""
-        total, done = sum(len(kept.rows) for kept in self._kept.values()), 0
+    def _keep(self, rows: NDArray[np.int64], on_progress: Callable[[int, int], None]) -> _Kept:
+        where = self.device if self.on_card else torch.device("cpu")
+        kept = _Kept(rows, n=len(self.dataset), columns=len(self.inputs.names), where=where)
+        at_once = MAKE_ROWS if self.on_card else CACHE_ROWS
+        starts = range(0, len(rows), at_once)
         # Two threads even where one is asked for: one waits for memory while the other computes.
         with ThreadPoolExecutor(max(2, torch.get_num_threads())) as pool:
-            for mirror, kept in self._kept.items():
-                starts = range(0, len(kept.rows), MAKE_ROWS)
-                parts = [kept.rows[start : start + MAKE_ROWS] for start in starts]
-                for start, made in zip(starts, pool.map(partial(self._made, mirror=mirror), parts), strict=True):
-                    kept.columns[start : start + len(made)] = made
-                    done += len(made)
-                    on_progress(done, total)
+            parts = pool.map(self._made, [rows[start : start + at_once] for start in starts])
+            for start, made in zip(starts, parts, strict=True):
+                kept.columns[start : start + len(made)] = made
+                on_progress(start + len(made), len(rows))
+        return kept
 
     @torch.no_grad()
-    def _made(self, rows: NDArray[np.int64] | Tensor, *, mirror: bool = False) -> Tensor:
+    def _made(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
         """(rows, columns) inputs before normalisation, on the device."""
         if self.on_card:
             rows = torch.as_tensor(rows, device=self.device)
-        state = self.dataset.state(rows, history=self.inputs.history).to(self.device)
-        if mirror and self.places is not None:
-            state = mirror_state(state, self.places)
-        return self.inputs.project(state)
+        return self.inputs.project(self.dataset.state(rows, history=self.inputs.history).to(self.device))
 
-    def _columns(self, rows: NDArray[np.int64] | Tensor, *, mirror: bool = False) -> Tensor:
+    def _columns(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
         """The same, from what is kept if they are among it."""
-        kept = self._kept.get(mirror)
-        return self._made(rows, mirror=mirror) if kept is None else kept(rows).to(self.device)
+        return self._made(rows) if self._kept is None else self._kept(rows).to(self.device)
 
     def columns(self, rows: NDArray[np.int64]) -> Iterator[Tensor]:
         """Inputs of samples before normalisation, in chunks, in the memory of the processor."""
@@ -163,25 +158,20 @@ class Feed:
             return Batch(self._gather(np.asarray(share)), target, whole)
         if mirrored is None:
             return Batch(self.inputs.normalise(self._columns(share)), target, whole)
-        turned = torch.from_numpy(mirrored[mine])
-        columns = torch.empty(len(share), len(self.inputs.names), device=self.device)
-        for mirror in (False, True):
-            some = torch.nonzero(turned == mirror).squeeze(1)
-            if len(some):
-                part = share[some.to(share.device) if isinstance(share, Tensor) else some.numpy()]
-                columns[some.to(self.device)] = self._columns(part, mirror=mirror)
-        turned = turned.to(target.parameters.device)
-        parameters = torch.where(
-            turned[:, None], mirror_target(target, self.dataset.commands).parameters, target.parameters
-        )
-        return Batch(self.inputs.normalise(columns), Target(target.kind, parameters), whole)
+        turned = torch.from_numpy(mirrored[mine])[:, None]
+        other = mirror_target(target, self.dataset.commands).parameters
+        target = target._replace(parameters=torch.where(turned.to(other.device), other, target.parameters))
+        turned = turned.to(self.device)
+        columns = self._columns(share) * torch.where(turned, self.inputs.signs, 1.0)
+        columns[:, self.moved] = torch.where(turned, columns[:, self.order], columns[:, self.moved])
+        return Batch(self.inputs.normalise(columns), target, whole)
 
 
 class _Kept:
     """Inputs of some of ``n`` samples before normalisation, (len(rows), columns), in the memory ``where``."""
 
     def __init__(self, rows: NDArray[np.int64], *, n: int, columns: int, where: torch.device) -> None:
-        self.rows, self.columns = rows, torch.empty(len(rows), columns, device=where)
+        self.columns = torch.empty(len(rows), columns, device=where)
         self.place = torch.full((n,), -1, dtype=torch.int64, device=where)
         self.place[torch.from_numpy(rows).to(where)] = torch.arange(len(rows), device=where)
 

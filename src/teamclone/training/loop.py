@@ -22,7 +22,7 @@ from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.files import write_atomic
-from teamclone.models.heads import WITH_BALL, with_ball
+from teamclone.models.heads import WITH_BALL, MixtureHead, with_ball
 from teamclone.models.loss import Balance, ParameterLoss
 from teamclone.models.network import Clone
 from teamclone.training.calibration import Calibration
@@ -175,8 +175,10 @@ def train(
                 loss = loss_of(output, target, balance=balance, whole=whole)
                 error = loss.total
                 for kick_inputs, kick_target, whole_kicks in islice(kick_batches, 1):
-                    taught = loss_of(answer_of(kick_inputs), kick_target, whole=whole_kicks)
-                    error = error + config.train.parameter_weight * taught.parameters
+                    with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bf16"):
+                        kicked = model.kicks(kick_inputs)
+                    taught = cast(MixtureHead, model.head).kick_loss(kicked, kick_target, of=len(whole_kicks))
+                    error = error + config.train.parameter_weight * taught
                 optimiser.zero_grad(set_to_none=True)
                 error.backward()  # type: ignore[no-untyped-call]
                 group.add_up_gradients(model)

@@ -117,7 +117,9 @@ def curve(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         data=replace(adapted.data, batches_per_epoch=1, validation_batches=1),
         train=replace(adapted.train, epochs=1),
     )
-    train(short, part(dataset, order[:1], folder / "first"), folder / "warm", base=base)
+    result["environment"] = train(
+        short, part(dataset, order[:1], folder / "first"), folder / "warm", base=base
+    ).environment
     with progress("adapting") as bar:
         task = bar.add_task("", total=2 * len(counts))
         for count in counts:

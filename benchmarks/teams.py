@@ -143,12 +143,12 @@ match of two of these teams counts twice for the clone of them all, seen from ei
         table(HEADERS, [figures_of(name, clone) for name, clone in clones.items()]),
         "## Few matches of a new team",
         f"""The clone of them all, adapted to {new} ([adapt](adapt.md)) with some matches, beside a fresh network of the
-same form that goes through as many batches; both are tested on {len(adapted["matches"])} matches of
-{adapted["rows"]:,} commands. {seen}""",
+same form that goes through as many batches, on {adapted["environment"]["threads"]} threads; both are tested on
+{len(adapted["matches"])} matches of {adapted["rows"]:,} commands. {seen}""",
         table(("training matches", "samples", "adapted, s", *OF_TWO, "fresh, s", *OF_TWO), rows),
         "## Reproduce",
         "```\n" + "\n".join(work.commands) + "\n```",
-        machines(clone["machine"] for clone in clones.values()),
+        machines([*(clone["machine"] for clone in clones.values()), adapted["environment"]]),
     ]
     return "\n\n".join(filled(part) for part in parts)
 

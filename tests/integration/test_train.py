@@ -321,9 +321,10 @@ def test_what_is_kept_in_memory_changes_no_result(dataset: Dataset, tmp_path: Pa
         return figures(run)[-1]
 
     usual = trained(8.0)
+    assert trained(0.0) == pytest.approx(usual, rel=1e-4)
     assert trained(4e-9 * inputs * 627) == pytest.approx(usual, rel=1e-4)
     assert trained(4e-9 * inputs * 628) == usual
-    assert told == [(628,), (), (628,)]
+    assert told == [(628,), (), (), (628,)]
 
 
 def test_the_remedies_resume_bit_for_bit(dataset: Dataset, tmp_path: Path) -> None:

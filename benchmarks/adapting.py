@@ -31,7 +31,7 @@ from teamclone.dataset.write import write_dataset
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation import metrics
 from teamclone.evaluation.evaluate import predict
-from teamclone.models.network import Clone
+from teamclone.models.clone import Clone
 from teamclone.store import Store, create_store, open_store
 from teamclone.store.ingest import ingest
 from teamclone.training.adapt import CHECKPOINT, adaptation

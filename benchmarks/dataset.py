@@ -22,7 +22,7 @@ from measure import HEADERS, cost_of
 from teamclone.cli.common import print_table
 from teamclone.dataset import clean
 from teamclone.store import create_store, open_store
-from teamclone.store.workers import available_cpus, run_tasks
+from teamclone.system.workers import available_cpus, run_tasks
 
 COLUMNS = {
     "frames": clean.FRAME_COLUMNS,

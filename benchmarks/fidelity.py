@@ -43,17 +43,18 @@ from teamclone.errors import TeamcloneError
 from teamclone.evaluation import baselines, metrics
 from teamclone.evaluation.evaluate import count_training, describe, predict, truth
 from teamclone.evaluation.outcome import Outcome
-from teamclone.files import write_json
-from teamclone.machine import processor
+from teamclone.models.clone import parameter_count
 from teamclone.models.config import BLOCKS
-from teamclone.models.network import parameter_count
-from teamclone.models.physics import kickable_area, kicked, reach_ball
-from teamclone.models.planning.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
-from teamclone.models.relative import RelativeFeatures
-from teamclone.models.state import CHANNEL, State
+from teamclone.models.inputs.egocentric import RelativeFeatures
+from teamclone.models.inputs.reach import kickable_area, kicked, reach_ball
+from teamclone.planner.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
 from teamclone.rcss.commands import CLONED, PARAMETERS
+from teamclone.system.files import write_json
+from teamclone.system.machine import processor
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
+from teamclone.world.channels import CHANNEL
+from teamclone.world.state import State
 
 FORMAT = 1
 """Of the result files; raised whenever they would be misread."""

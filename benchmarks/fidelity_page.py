@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
 
 from teamclone.evaluation.metrics import even_log_loss
-from teamclone.files import write_atomic
 from teamclone.rcss.commands import CLONED
+from teamclone.system.files import write_atomic
 
 Results = Mapping[str, Mapping[str, Any]]
 NOTHING = "-"

@@ -21,10 +21,10 @@ from measure import HEADERS, cost_of
 
 from teamclone.cli.common import print_table
 from teamclone.logs import LogPair, find_matches
-from teamclone.logs.open import read_bytes
+from teamclone.logs.inflate import read_bytes
 from teamclone.store import open_store
 from teamclone.store.ingest import files_of
-from teamclone.store.workers import available_cpus, run_tasks
+from teamclone.system.workers import available_cpus, run_tasks
 
 PACK: dict[str, Callable[[bytes], bytes]] = {".gz": gzip.compress, ".xz": lzma.compress, ".rcg": bytes}
 

@@ -32,7 +32,7 @@ from measure import cost_of
 
 from teamclone.cli.common import print_table
 from teamclone.logs import LogPair, Match, find_matches, read_pair
-from teamclone.logs.open import read_bytes
+from teamclone.logs.inflate import read_bytes
 from teamclone.logs.rcl import read_commands
 from teamclone.logs.read import read_game
 from teamclone.rcss.commands import CommandKind

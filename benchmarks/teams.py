@@ -21,7 +21,7 @@ from fidelity import TEST_MATCHES
 from fidelity_page import filled, machines, table
 from measure import cost_of
 
-from teamclone.files import write_atomic, write_json
+from teamclone.system.files import write_atomic, write_json
 from teamclone.training.config import load_config
 from teamclone.training.run import open_run
 

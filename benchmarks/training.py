@@ -23,9 +23,9 @@ import torch
 from teamclone.cli.common import print_table
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
-from teamclone.models.network import Clone
+from teamclone.models.clone import Clone
+from teamclone.training.batches import Feed
 from teamclone.training.config import load_config
-from teamclone.training.feed import Feed
 from teamclone.training.group import ALONE
 from teamclone.training.loop import has_fast_bfloat16, train
 

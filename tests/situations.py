@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import torch
 
-from teamclone.dataset.layout import FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING
-from teamclone.models.state import CHANNEL, TYPE_FIELD, State
 from teamclone.rcss.commands import CLONED_KINDS
 from teamclone.rcss.player_types import DEFAULTS, FIELDS, GROUPS, RANGES
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.world.channels import CHANNEL, FLAG_COLLIDED, FLAG_ON_FIELD, FLAG_TACKLING, TYPE_FIELD
+from teamclone.world.state import State
 
 
 def situations(n: int, *, seed: int = 0, history: int = 0, dtype: torch.dtype = torch.float32) -> State:

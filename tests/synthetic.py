@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from teamclone.dataset.layout import CODE, DETAIL, DETAIL_CHANNELS, FLAG_GOALIE, FLAG_ON_FIELD, STEPS, Split
+from teamclone.dataset.layout import CATEGORICAL_INDEX, MEASURED_INDEX, STEP, STEPS, Split
 from teamclone.dataset.write import write_dataset
 from teamclone.rcss.commands import CLONED, CLONED_KINDS, CommandKind
 from teamclone.rcss.player_types import DEFAULTS, FIELDS, GROUPS, RANGES
+from teamclone.world.channels import FLAG_GOALIE, FLAG_ON_FIELD, MEASURED
 
 N_TYPES = 18
 
@@ -43,13 +44,13 @@ def make_dataset(
         "flags": np.broadcast_to(FLAG_ON_FIELD + FLAG_GOALIE * (np.arange(22) % 11 == 0), (n, 22)),
         "last_command": rng.choice([int(kind) for kind in (0, *CLONED_KINDS, CommandKind.CATCH)], (n, 22)),
     }
-    detail = np.stack([np.rint(values[channel.name] / channel.step) for channel in DETAIL_CHANNELS], -1)
-    code = np.stack([values[name] for name in CODE], -1)
+    detail = np.stack([np.rint(values[channel.name] / STEP[channel.name]) for channel in MEASURED], -1)
+    code = np.stack([values[name] for name in CATEGORICAL_INDEX], -1)
 
     frame = np.repeat(np.arange(n), 10)
     player = np.tile(np.arange(1, 11), n)
     x, y = position[frame, player].T
-    body = detail[frame, player, DETAIL["body"]] * STEPS[DETAIL["body"]]
+    body = detail[frame, player, MEASURED_INDEX["body"]] * STEPS[MEASURED_INDEX["body"]]
     kind = np.select([x > 35, np.abs(y) > 28, x < 0], [2, 3, 1], 0)
     parameters = np.zeros((len(kind), 2))
     parameters[kind == 0] = np.stack([100 - 2 * x, -body], 1)[kind == 0]
@@ -70,8 +71,8 @@ def make_dataset(
         "score": np.zeros((n, 2)),
         "ball": ball,
         "position": position,
-        "detail": detail,
-        "code": code,
+        "measured": detail,
+        "categorical": code,
     }
     samples = {
         "frame": frame,

@@ -15,12 +15,12 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.errors import PlayError, UsageError
 from teamclone.evaluation.evaluate import evaluate, save_evaluation
 from teamclone.evaluation.report import fresh_evaluation, make_report
-from teamclone.play.plan import Plan, folder_of, plan_from, read_plan
-from teamclone.play.play import PlayReport, play
 from teamclone.play.record import Record
+from teamclone.play.runner import PlayReport, play
+from teamclone.play.schedule import Plan, folder_of, plan_from, read_plan
 from teamclone.play.server import find_server
-from teamclone.settings import fill
 from teamclone.store import create_store
+from teamclone.system.settings import fill
 from teamclone.training.config import Config, differences, load_config
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, is_run, open_run

@@ -24,7 +24,7 @@ from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.evaluation import metrics
 from teamclone.evaluation.evaluate import evaluate, predict
 from teamclone.evaluation.report import commands
-from teamclone.models.network import model_id
+from teamclone.models.clone import model_id
 from teamclone.training.adapt import SETTINGS, adaptation
 from teamclone.training.config import load_config, override, to_table
 from teamclone.training.loop import Progress, train

@@ -19,12 +19,12 @@ from teamclone.evaluation.evaluate import evaluate
 from teamclone.evaluation.report import make_report
 from teamclone.logs import read_match
 from teamclone.rcss.commands import CLONED, REPERTOIRE
+from teamclone.search.search import Mode, SearchConfig, search
 from teamclone.store import create_store
 from teamclone.training.adapt import adaptation
 from teamclone.training.config import Config, load_config
 from teamclone.training.loop import train
 from teamclone.training.run import Run
-from teamclone.training.search import Mode, SearchConfig, search
 
 ALL = f"model.commands={','.join(REPERTOIRE)}"
 SMALL = (

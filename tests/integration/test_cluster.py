@@ -20,10 +20,10 @@ import pytest
 from command import TEAMCLONE, teamclone
 from playing import strays, write_plan
 from teamclone.errors import UsageError
-from teamclone.play.plan import load_plan
-from teamclone.play.play import _play_match, _Task
+from teamclone.play.runner import _play_match, _Task
+from teamclone.play.schedule import load_plan
 from teamclone.store import create_store, ingest, open_store
-from teamclone.store.cluster import executor_of
+from teamclone.system.cluster import executor_of
 
 DASK = TEAMCLONE.with_name("dask")
 QUIET = subprocess.DEVNULL

@@ -26,10 +26,10 @@ from disk import small_disk
 from playing import STANDIN, TEAM, started, strays, write_plan
 from teamclone.errors import UsageError
 from teamclone.logs import read_match
-from teamclone.play.keeper import Order
-from teamclone.play.plan import load_plan
-from teamclone.play.play import _attempt
 from teamclone.play.record import NAME
+from teamclone.play.runner import _attempt
+from teamclone.play.schedule import load_plan
+from teamclone.play.supervisor import Order
 from teamclone.store import open_store
 
 REAL = shutil.which("rcssserver")
@@ -302,7 +302,9 @@ def test_a_killed_keeper_costs_an_attempt(tmp_path: Path) -> None:
     plan = write_plan(tmp_path, [("Red", "Blue")], attempts=2, half_time=60, teams={"Red": f"{TEAM} --fork"})
     process = started(plan, out)
     wait_for_match(out)
-    [keeper] = [child for child in psutil.Process(process.pid).children() if "teamclone.play.keeper" in child.cmdline()]
+    [keeper] = [
+        child for child in psutil.Process(process.pid).children() if "teamclone.play.supervisor" in child.cmdline()
+    ]
     keeper.kill()
     assert process.wait(100) == 0
     record = json.loads((out / "matches" / "Red-vs-Blue-1" / NAME).read_text())
@@ -465,7 +467,7 @@ def test_the_server_s_cycle_may_be_another(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_does_not_wait_for_a_keeper_that_is_stuck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("teamclone.play.play._END_S", 1.0)
+    monkeypatch.setattr("teamclone.play.runner._END_S", 1.0)
     out = tmp_path / "out"
     fixture = load_plan(write_plan(tmp_path, [("Red", "Blue")], half_time=300)).fixtures[0]
     folder, wanted = out / "match", out / "wanted"
@@ -475,7 +477,7 @@ def test_ctrl_c_does_not_wait_for_a_keeper_that_is_stuck(tmp_path: Path, monkeyp
     with ThreadPoolExecutor(1) as pool:
         asked = pool.submit(_attempt, order, wanted)
         wait_for_match(out, glob="match/output/right-team.txt")
-        [keeper] = [child for child in psutil.Process().children() if "teamclone.play.keeper" in child.cmdline()]
+        [keeper] = [child for child in psutil.Process().children() if "teamclone.play.supervisor" in child.cmdline()]
         keeper.suspend()
         wanted.unlink()
         with pytest.raises(UsageError, match="no longer wanted"):

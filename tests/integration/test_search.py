@@ -22,10 +22,10 @@ from teamclone.cli import main
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import RunError
+from teamclone.search.search import Mode, Search, SearchConfig, Status, Study, open_search, search
 from teamclone.training.config import load_config, override
 from teamclone.training.loop import train
 from teamclone.training.run import open_run
-from teamclone.training.search import Mode, Search, SearchConfig, Status, Study, open_search, search
 
 COMMAND = (sys.executable, "-c", "from teamclone.cli import main; main()", "search")
 TINY = (

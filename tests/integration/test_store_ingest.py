@@ -23,7 +23,7 @@ from teamclone.logs import LogPair
 from teamclone.store import Store, create_store, ingest, open_store
 from teamclone.store import ingest as ingest_function
 from teamclone.store.status import Outcome
-from teamclone.store.workers import DIED
+from teamclone.system.workers import DIED
 
 COMMAND = Path(sys.executable).with_name("teamclone")
 PLAIN = "20261122113117-HELIOS_base_0-vs-WEBase_0"

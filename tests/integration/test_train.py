@@ -14,12 +14,12 @@ import torch
 from safetensors.torch import load_file
 from tests.synthetic import make_dataset
 
-from teamclone.dataset.layout import DETAIL, MISSING, Split
+from teamclone.dataset.layout import MEASURED_INDEX, MISSING, Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.evaluation.evaluate import evaluate
 from teamclone.evaluation.latency import measure_latency
-from teamclone.models.network import Clone
+from teamclone.models.clone import Clone
 from teamclone.training.config import Config, load_config, to_table
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, open_run
@@ -162,7 +162,7 @@ def test_a_full_disk_at_any_write_costs_an_epoch_at_most(
             raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("teamclone.files.os.fsync", fsync)
+        patch.setattr("teamclone.system.files.os.fsync", fsync)
         with pytest.raises(OSError, match="No space left"):
             train(tiny("train.epochs=2"), dataset, tmp_path / "run")
     # Two writes make the folder; where it was not made, training begins anew.
@@ -437,10 +437,10 @@ def test_datasets_that_cannot_be_trained_on(dataset: Dataset, tmp_path: Path) ->
 @pytest.mark.parametrize(("channel", "match"), [("vx", 0), ("ball_vx", 0), ("vx", 1)])
 def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, channel: str, match: int) -> None:
     """In a match to train on, 0, and in one to validate on, 1."""
-    detail, ball = (dataset.frames[name].numpy().copy() for name in ("detail", "ball"))
+    detail, ball = (dataset.frames[name].numpy().copy() for name in ("measured", "ball"))
     frame = 7 + 50 * match
     if channel == "vx":
-        detail[frame, :, DETAIL["vx"]] = MISSING
+        detail[frame, :, MEASURED_INDEX["vx"]] = MISSING
     else:
         ball[frame, 2] = np.nan
     changes = {"frames/detail": detail, "frames/ball": ball}
@@ -451,8 +451,8 @@ def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, cha
 
 def test_evaluation_names_a_value_that_a_log_lacks(dataset: Dataset, tmp_path: Path) -> None:
     run = train(tiny(), dataset, tmp_path / "run")
-    detail = dataset.frames["detail"].numpy().copy()
-    detail[:, :, DETAIL["vx"]] = MISSING
+    detail = dataset.frames["measured"].numpy().copy()
+    detail[:, :, MEASURED_INDEX["vx"]] = MISSING
     lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **{"frames/detail": detail}))
     with pytest.raises(DatasetError, match="has no vx in its log"):
         evaluate(run, dataset=lacking)

@@ -20,7 +20,7 @@ def bench(
     """Time single answers of a clone on one thread, and answers for 22 players at once."""
     from teamclone.dataset.reader import open_dataset
     from teamclone.evaluation.latency import measure_latency
-    from teamclone.files import write_json
+    from teamclone.system.files import write_json
     from teamclone.training.run import open_run
 
     opened = open_run(run)

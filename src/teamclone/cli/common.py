@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from teamclone.errors import UsageError
-from teamclone.settings import value_of
+from teamclone.system.settings import value_of
 
 E = TypeVar("E", bound=StrEnum)
 

@@ -52,7 +52,7 @@ def dataset(
     from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
     from teamclone.dataset.clean import Commands, TurnZero
     from teamclone.store import open_store
-    from teamclone.store.cluster import executor_of
+    from teamclone.system.cluster import executor_of
 
     config = DatasetConfig(
         teams=tuple(team),

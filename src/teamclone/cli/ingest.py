@@ -21,9 +21,9 @@ def ingest(
     """Read match logs into a store. Files that were read before and have not changed are skipped."""
     from teamclone.cli.common import print_json, print_table, progress
     from teamclone.store import create_store
-    from teamclone.store.cluster import executor_of
     from teamclone.store.ingest import ingest as run
     from teamclone.store.status import Outcome
+    from teamclone.system.cluster import executor_of
 
     with executor_of(scheduler, jobs=jobs) as executor, progress("ingest") as bar:
         task = bar.add_task("", total=None)

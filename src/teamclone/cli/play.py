@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from teamclone.play.play import PlayReport
     from teamclone.play.record import Record
+    from teamclone.play.runner import PlayReport
 
 SHOWN = 20
 """Failed matches that are listed."""
@@ -44,10 +44,10 @@ def play(
     """Play matches on rcssserver, unattended. Given again, the same command plays what is missing."""
     from teamclone.cli.common import print_json, progress, values_of
     from teamclone.errors import UsageError
-    from teamclone.play.plan import load_plan, quick_plan
-    from teamclone.play.play import play as run
+    from teamclone.play.runner import play as run
+    from teamclone.play.schedule import load_plan, quick_plan
     from teamclone.store import create_store
-    from teamclone.store.cluster import executor_of
+    from teamclone.system.cluster import executor_of
 
     if (plan is None) == (left is None and right is None):
         raise UsageError("give a plan, or --left and --right")

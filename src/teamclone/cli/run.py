@@ -26,7 +26,7 @@ def run(
     from teamclone.cli.play import line_of
     from teamclone.cli.train import reporter
     from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
-    from teamclone.store.cluster import executor_of
+    from teamclone.system.cluster import executor_of
 
     asked = load_pipeline(plan)
     with executor_of(scheduler, jobs=jobs) as executor, progress("run") as bar:

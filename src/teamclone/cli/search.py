@@ -15,7 +15,7 @@ from teamclone.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from teamclone.training.search import Search, Trial
+    from teamclone.search.search import Search, Trial
 
 
 def search(
@@ -58,7 +58,7 @@ def search(
     base = load_config(preset, overrides or [])
 
     from teamclone.dataset.reader import open_dataset
-    from teamclone.training import search as library
+    from teamclone.search import search as library
 
     kind = choice(library.Mode, mode, option="--mode")
     given: dict[str, Any] = {
@@ -94,7 +94,7 @@ def search(
     except KeyboardInterrupt:
         fail(f"interrupted; all finished trials and epochs are kept in {out}; give the same command to go on", code=130)
 
-    from teamclone.training.search_figure import write_figure
+    from teamclone.search.figure import write_figure
 
     if any(trial.figures for trial in found.trials):
         write_figure(found)
@@ -111,7 +111,7 @@ def _widths(text: str) -> tuple[int, ...]:
 
 
 def _settled(search: Search) -> list[Trial]:
-    from teamclone.training.search import SETTLED
+    from teamclone.search.search import SETTLED
 
     return [trial for trial in search.trials if trial.status in SETTLED]
 
@@ -120,7 +120,7 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
     """Progress as a bar, one step a trial; of a beam search the trials of the next step are not known yet."""
 
     def report(search: Search) -> None:
-        from teamclone.training.search import Mode, Status
+        from teamclone.search.search import Mode, Status
 
         running = [
             f"{trial.name} epoch {len(trial.curve) + 1}" for trial in search.trials if trial.status is Status.RUNNING
@@ -161,7 +161,7 @@ def _line(trial: Trial) -> str:
 def _summary(search: Search, *, as_json: bool) -> None:
     from dataclasses import asdict
 
-    from teamclone.training.search import Mode
+    from teamclone.search.search import Mode
 
     ranked = search.ranked()
     if as_json:

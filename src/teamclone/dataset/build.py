@@ -23,7 +23,8 @@ from teamclone.errors import DatasetError, UsageError
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
 from teamclone.store import Store
-from teamclone.store.workers import Died, SharedStore, run_tasks
+from teamclone.store.shared import SharedStore
+from teamclone.system.workers import Died, run_tasks
 
 AHEAD = 64
 """Cleaned matches that a cluster may hold ready: more than one writer takes from it in a second, in 300 MB."""

@@ -18,6 +18,7 @@ from teamclone.rcss import pitch, state_bits
 from teamclone.rcss.commands import BODY_KINDS, CLONED, CommandKind
 from teamclone.rcss.playmodes import SITUATION, PlayMode, Situation
 from teamclone.rcss.reference_frame import rotate_angle, rotate_point
+from teamclone.world import channels
 
 N_TEAM = 11
 
@@ -42,12 +43,12 @@ COMMAND_COLUMNS = ("frame", "side", "unum", "kind", "legs", "valid", "arg0", "ar
 """What cleaning needs of a match's tables."""
 
 _FLAGS = (
-    (layout.FLAG_ON_FIELD, state_bits.STAND),
-    (layout.FLAG_GOALIE, state_bits.GOALIE),
-    (layout.FLAG_TACKLING, state_bits.TACKLE | state_bits.TACKLE_FAULT),
-    (layout.FLAG_CHARGED, state_bits.FOUL_CHARGED),
-    (layout.FLAG_COLLIDED, state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE),
-    (layout.FLAG_YELLOW, state_bits.YELLOW_CARD),
+    (channels.FLAG_ON_FIELD, state_bits.STAND),
+    (channels.FLAG_GOALIE, state_bits.GOALIE),
+    (channels.FLAG_TACKLING, state_bits.TACKLE | state_bits.TACKLE_FAULT),
+    (channels.FLAG_CHARGED, state_bits.FOUL_CHARGED),
+    (channels.FLAG_COLLIDED, state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE),
+    (channels.FLAG_YELLOW, state_bits.YELLOW_CARD),
 )
 
 
@@ -277,23 +278,23 @@ def _frames(frames: Columns, players: Columns, kept: NDArray[np.int64], *, side:
     turned = side < 0
 
     def seen(name: str) -> NDArray[Any]:
-        values: NDArray[Any] = players[name][np.ix_(kept, axis)]
-        return values
+        column: NDArray[Any] = players[name][np.ix_(kept, axis)]
+        return column
 
     ball = np.stack([frames[name][kept] for name in ("ball_x", "ball_y", "ball_vx", "ball_vy")], axis=-1)
     position = np.stack([seen("x"), seen("y")], axis=-1)
-    detail: dict[str, NDArray[Any]] = {name: seen(name) for name in layout.PLAYER_CHANNELS if name in players}
+    values: dict[str, NDArray[Any]] = {name: seen(name) for name in channels.PLAYER_CHANNELS if name in players}
     if turned:
         ball, position = rotate_point(ball), rotate_point(position)
-        detail["vx"], detail["vy"] = rotate_point(detail["vx"]), rotate_point(detail["vy"])
-        detail["body"] = rotate_angle(detail["body"])
+        values["vx"], values["vy"] = rotate_point(values["vx"]), rotate_point(values["vy"])
+        values["body"] = rotate_angle(values["body"])
     state = seen("state")
-    detail["flags"] = sum(
+    values["flags"] = sum(
         (np.where((state & bits) != 0, flag, 0) for flag, bits in _FLAGS), np.zeros(state.shape, np.int64)
     )
     executed = executed_kind(frames, players)
     last = np.concatenate([np.zeros_like(executed[:1]), executed[:-1]])
-    detail["last_command"] = last[np.ix_(kept, axis)]
+    values["last_command"] = last[np.ix_(kept, axis)]
     own, other = ("left_score", "right_score") if side > 0 else ("right_score", "left_score")
     return {
         "cycle": frames["cycle"][kept],
@@ -302,10 +303,10 @@ def _frames(frames: Columns, players: Columns, kept: NDArray[np.int64], *, side:
         # Adding zero turns the -0.0 of logs and of the rotation into 0.0.
         "ball": ball.astype(np.float32) + np.float32(0),
         "position": position.astype(np.float32) + np.float32(0),
-        "detail": np.stack(
-            [_stored(detail[channel.name], channel.step) for channel in layout.DETAIL_CHANNELS], axis=-1
+        "measured": np.stack(
+            [_stored(values[channel.name], layout.STEP[channel.name]) for channel in channels.MEASURED], axis=-1
         ),
-        "code": np.stack([_code(detail[name]) for name in layout.CODE], axis=-1),
+        "categorical": np.stack([_code(values[channel.name]) for channel in channels.CATEGORICAL], axis=-1),
     }
 
 

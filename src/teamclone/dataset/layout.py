@@ -16,7 +16,9 @@ from enum import IntEnum
 
 import numpy as np
 
-FORMAT = 2
+from teamclone.world.channels import CATEGORICAL, MEASURED
+
+FORMAT = 3
 """Raised whenever a reader of the old layout would misread the new one."""
 
 
@@ -40,63 +42,22 @@ class Array:
     about: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
-    """One channel of ``detail``: stored as int16, value = stored * ``step``; not-a-number is stored as -32768."""
-
-    name: str
-    step: float
-    unit: str
-    about: str
-
-
 MISSING = -32768
-"""A channel's value that the log does not hold."""
-
-DETAIL_CHANNELS = (
-    Channel(name="vx", step=1e-4, unit="m/cycle", about="velocity after decay"),
-    Channel(name="vy", step=1e-4, unit="m/cycle", about="velocity after decay"),
-    Channel(name="body", step=1e-2, unit="deg", about="body direction, 0 = towards the opponent's goal"),
-    Channel(name="neck", step=1e-2, unit="deg", about="neck direction relative to the body"),
-    Channel(name="view_width", step=1e-2, unit="deg", about="opening of the view cone"),
-    Channel(name="stamina", step=0.25, unit="stamina", about="stamina"),
-    Channel(name="effort", step=1e-4, unit="", about="dash efficiency"),
-    Channel(name="recovery", step=1e-4, unit="", about="stamina recovery rate"),
-    Channel(name="capacity", step=4.0, unit="stamina", about="stamina left to recover"),
-)
-"""What is measured of each player beside his position."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Code:
-    """One channel of ``code``: stored as uint8; not-a-number is stored as 255."""
-
-    name: str
-    about: str
-
-
+"""A measured channel's value that the log does not hold."""
 NO_CODE = 255
-"""A code that the log does not hold."""
-
-CODE_CHANNELS = (
-    Code(name="type", about="heterogeneous player type"),
-    Code(name="flags", about="bit mask of FLAG_*"),
-    Code(
-        name="last_command",
-        about="command kind id that the server executed between the previous frame and this one; 0 none",
-    ),
-)
-"""What is counted or named of each player."""
-
-FLAG_ON_FIELD = 1
-FLAG_GOALIE = 2
-FLAG_TACKLING = 4
-"""Frozen after a tackle."""
-FLAG_CHARGED = 8
-"""Frozen after a foul against him."""
-FLAG_COLLIDED = 16
-"""Touched the ball, a player or a post in the last cycle."""
-FLAG_YELLOW = 32
+"""A categorical channel's value that the log does not hold."""
+STEP = {
+    "vx": 1e-4,
+    "vy": 1e-4,
+    "body": 1e-2,
+    "neck": 1e-2,
+    "view_width": 1e-2,
+    "stamina": 0.25,
+    "effort": 1e-4,
+    "recovery": 1e-4,
+    "capacity": 4.0,
+}
+"""Resolution of each measured channel: stored as int16, value = stored * step; NaN is stored as MISSING."""
 
 FRAME_ARRAYS = (
     Array(name="match", dtype="int32", shape=(), about="index into the dataset's list of matches"),
@@ -105,8 +66,10 @@ FRAME_ARRAYS = (
     Array(name="score", dtype="int8", shape=(2,), about="goals of the modelled team and of its opponent"),
     Array(name="ball", dtype="float32", shape=(4,), about="x, y in m, vx, vy in m/cycle"),
     Array(name="position", dtype="float32", shape=(22, 2), about="x, y of every player in m"),
-    Array(name="detail", dtype="int16", shape=(22, len(DETAIL_CHANNELS)), about="DETAIL_CHANNELS of every player"),
-    Array(name="code", dtype="uint8", shape=(22, len(CODE_CHANNELS)), about="CODE_CHANNELS of every player"),
+    Array(name="measured", dtype="int16", shape=(22, len(MEASURED)), about="MEASURED channels of every player"),
+    Array(
+        name="categorical", dtype="uint8", shape=(22, len(CATEGORICAL)), about="CATEGORICAL channels of every player"
+    ),
 )
 
 SAMPLE_ARRAYS = (
@@ -129,14 +92,6 @@ SAMPLE_ARRAYS = (
     Array(name="split", dtype="uint8", shape=(), about="Split"),
 )
 
-DETAIL = {channel.name: index for index, channel in enumerate(DETAIL_CHANNELS)}
-CODE = {channel.name: index for index, channel in enumerate(CODE_CHANNELS)}
-PLAYER_CHANNELS = ("x", "y", *DETAIL, *CODE)
-"""The channels of ``State.players``, in SI units and degrees: position, then DETAIL_CHANNELS, then CODE_CHANNELS."""
-
-STEPS = np.array([channel.step for channel in DETAIL_CHANNELS], np.float32)
-
-
-def bytes_per_row(arrays: tuple[Array, ...]) -> int:
-    """Size of one row over all arrays."""
-    return sum(np.dtype(array.dtype).itemsize * int(np.prod(array.shape)) for array in arrays)
+MEASURED_INDEX = {channel.name: index for index, channel in enumerate(MEASURED)}
+CATEGORICAL_INDEX = {channel.name: index for index, channel in enumerate(CATEGORICAL)}
+STEPS = np.array([STEP[channel.name] for channel in MEASURED], np.float32)

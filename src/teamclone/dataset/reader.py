@@ -16,23 +16,23 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from teamclone.dataset.layout import (
-    CODE,
-    DETAIL,
+    CATEGORICAL_INDEX,
     FORMAT,
     FRAME_ARRAYS,
+    MEASURED_INDEX,
     MISSING,
     NO_CODE,
-    PLAYER_CHANNELS,
     SAMPLE_ARRAYS,
     STEPS,
     Array,
     Split,
 )
 from teamclone.errors import DatasetError
-from teamclone.models.state import State, Target
 from teamclone.rcss.commands import CLONED, CommandKind, not_of_repertoire
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.playmodes import OTHER_SIDE
+from teamclone.world.channels import PLAYER_CHANNELS
+from teamclone.world.state import State, Target
 
 Rows = NDArray[np.int64] | Tensor
 """Indices of samples, (batch,) int64."""
@@ -109,10 +109,18 @@ class Dataset:
         for start in range(0, len(frames), CHECKED_FRAMES):
             part = frames[start : start + CHECKED_FRAMES]
             ball = self.frames["ball"].numpy()[part]
-            detail, code = (self.frames[name].numpy()[part] for name in ("detail", "code"))
+            measured, categorical = (self.frames[name].numpy()[part] for name in ("measured", "categorical"))
             lacking = {f"ball_{name}": np.isnan(ball[:, index]) for index, name in enumerate(("x", "y", "vx", "vy"))}
-            lacking |= {name: (detail[..., DETAIL[name]] == MISSING).any(1) for name in channels if name in DETAIL}
-            lacking |= {name: (code[..., CODE[name]] == NO_CODE).any(1) for name in channels if name in CODE}
+            lacking |= {
+                name: (measured[..., MEASURED_INDEX[name]] == MISSING).any(1)
+                for name in channels
+                if name in MEASURED_INDEX
+            }
+            lacking |= {
+                name: (categorical[..., CATEGORICAL_INDEX[name]] == NO_CODE).any(1)
+                for name in channels
+                if name in CATEGORICAL_INDEX
+            }
             for name, column in lacking.items():
                 if column.any():
                     match = self.matches[int(self.frames["match"][part[column][0]])]
@@ -167,14 +175,14 @@ class Dataset:
 
     def _players(self, frame: Tensor) -> Tensor:
         """(frames, 22, len(PLAYER_CHANNELS)) of some frames."""
-        detail, code = (self.frames[name].index_select(0, frame) for name in ("detail", "code"))
+        stored, codes = (self.frames[name].index_select(0, frame) for name in ("measured", "categorical"))
         players = torch.empty(len(frame), 22, len(PLAYER_CHANNELS), device=frame.device)
         players[..., :2] = self.frames["position"].index_select(0, frame)
-        measured, coded = players[..., 2 : 2 + len(DETAIL)], players[..., 2 + len(DETAIL) :]
-        torch.mul(detail, _steps(frame.device), out=measured)
-        measured.masked_fill_(detail == MISSING, math.nan)
-        coded[...] = code
-        coded.masked_fill_(code == NO_CODE, math.nan)
+        measured, categorical = players[..., 2 : 2 + len(MEASURED_INDEX)], players[..., 2 + len(MEASURED_INDEX) :]
+        torch.mul(stored, _steps(frame.device), out=measured)
+        measured.masked_fill_(stored == MISSING, math.nan)
+        categorical[...] = codes
+        categorical.masked_fill_(codes == NO_CODE, math.nan)
         return players
 
     def target(self, rows: Rows) -> Target:
@@ -190,7 +198,7 @@ class Dataset:
         rows = torch.as_tensor(rows)
         frame = self.samples["frame"].index_select(0, rows)
         actor = self.samples["player"].index_select(0, rows)
-        kind = self.frames["code"][frame.long(), actor.long(), CODE["last_command"]].long()
+        kind = self.frames["categorical"][frame.long(), actor.long(), CATEGORICAL_INDEX["last_command"]].long()
         place = torch.full((NO_CODE + 1,), -1, dtype=torch.int64)
         for index, name in enumerate(self.commands):
             place[0 if name == "none" else CommandKind[name.upper()]] = index

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.dataset.layout import CODE, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
+from teamclone.dataset.layout import CATEGORICAL_INDEX, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
 from teamclone.errors import DatasetError
-from teamclone.files import held
 from teamclone.rcss.commands import CLONED
 from teamclone.rcss.player_types import FIELDS
+from teamclone.system.files import held
 
 _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
 
@@ -63,7 +63,7 @@ class DatasetWriter:
                 self._files[table, name].append(values)
         for name, values in (
             ("frames/match", frames["match"]),
-            ("frames/code type", frames["code"][..., CODE["type"]]),
+            ("frames/categorical type", frames["categorical"][..., CATEGORICAL_INDEX["type"]]),
             ("samples/frame", samples["frame"]),
             ("samples/player", samples["player"]),
             ("samples/kind", samples["kind"]),
@@ -119,7 +119,7 @@ class DatasetWriter:
             )
         stops = {
             "frames/match": n_matches,
-            "frames/code type": types.shape[1],
+            "frames/categorical type": types.shape[1],
             "samples/frame": self.n_frames,
             "samples/player": 11,
             "samples/kind": n_commands,

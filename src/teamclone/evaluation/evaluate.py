@@ -22,15 +22,15 @@ from teamclone.evaluation import baselines as rules
 from teamclone.evaluation import bootstrap, metrics
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
-from teamclone.files import write_json
-from teamclone.models.heads import PointHead, with_ball
-from teamclone.models.network import model_id, parameter_count
-from teamclone.models.state import Target
+from teamclone.models.clone import model_id, parameter_count
+from teamclone.models.heads.mixture import PointHead, with_ball
 from teamclone.rcss.commands import CLONED, parameters_of
 from teamclone.rcss.playmodes import RESTARTS, PlayMode
+from teamclone.system.files import write_json
+from teamclone.world.state import Target
 
 if TYPE_CHECKING:
-    from teamclone.models.network import Clone
+    from teamclone.models.clone import Clone
     from teamclone.training.run import Run
 
 FORMAT = 2

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
-from teamclone.evaluation.pitch import draw_pitch
+from teamclone.plots.pitch import draw_pitch
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 
 KINDS = CLONED

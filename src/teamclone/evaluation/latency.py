@@ -16,12 +16,12 @@ import teamclone
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
 from teamclone.evaluation.evaluate import read_document
-from teamclone.machine import processor
-from teamclone.models.network import model_id
-from teamclone.models.state import State
+from teamclone.models.clone import model_id
+from teamclone.system.machine import processor
+from teamclone.world.state import State
 
 if TYPE_CHECKING:
-    from teamclone.models.network import Clone
+    from teamclone.models.clone import Clone
 
 FORMAT = 1
 """Of bench.json."""

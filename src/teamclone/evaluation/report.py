@@ -16,8 +16,8 @@ from teamclone.errors import RunError
 from teamclone.evaluation import bootstrap, figures, metrics, paper
 from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evaluation
 from teamclone.evaluation.latency import load_bench, measure_latency
-from teamclone.files import write_atomic, write_json
-from teamclone.models.network import model_id
+from teamclone.models.clone import model_id
+from teamclone.system.files import write_atomic, write_json
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
 

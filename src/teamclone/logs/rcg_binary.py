@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import columns
-from teamclone.logs.frames import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
+from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import columns
-from teamclone.logs.frames import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
+from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.playmodes import BY_NAME, PlayMode
 

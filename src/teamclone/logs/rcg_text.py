@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import scan
+from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.columns import COUNTERS, PLAYERS, counter_name
-from teamclone.logs.frames import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity
 from teamclone.rcss.playmodes import BY_NAME
 

@@ -12,9 +12,9 @@ from typing import BinaryIO
 import numpy as np
 
 from teamclone.errors import LogError, UsageError
-from teamclone.files import digest
 from teamclone.logs.align import executed_kind, first_body_commands, follows, frame_of, slot_of
 from teamclone.logs.columns import FRAMES, PLAYERS
+from teamclone.logs.inflate import read_bytes
 from teamclone.logs.match import (
     N_PLAYERS,
     CommandLog,
@@ -26,13 +26,13 @@ from teamclone.logs.match import (
     default_player_types,
     empty_columns,
 )
-from teamclone.logs.open import read_bytes
 from teamclone.logs.rcg_binary import read_binary
 from teamclone.logs.rcg_json import read_json
 from teamclone.logs.rcg_text import read_text
 from teamclone.logs.rcl import FIRST_LINE, read_commands, sender_names
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.system.files import digest
 
 _LOG_NAME = re.compile(r"(?P<stem>.+)\.(?P<kind>rcg|rcl)(?P<packing>\.(?:gz|xz|zst))?\Z", re.IGNORECASE | re.DOTALL)
 _FEWEST_EXECUTED = 0.8

@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from teamclone.compiling import tell_when_compiled
 from teamclone.rcss.commands import CommandKind
+from teamclone.system.compiling import tell_when_compiled
 
 Bytes = NDArray[np.uint8]
 

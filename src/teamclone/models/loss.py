@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED, parameters_of
+from teamclone.world.state import Target
 
 ParameterLoss = Literal["paper", "masked"]
 

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import psutil
 
-from teamclone.play.monitor import Monitor, Scene
-from teamclone.play.plan import N_UNUMS, Fixture, TeamSpec, filled_in
 from teamclone.play.ports import held_ports
 from teamclone.play.processes import MARK, end_all, start
 from teamclone.play.record import Fault
+from teamclone.play.schedule import N_UNUMS, Fixture, TeamSpec, filled_in
 from teamclone.play.server import last_words, met_taken_port, server_environment, server_words
+from teamclone.protocol.monitor import Monitor, Scene
 
 SIDES = ("left", "right")
 LEAST_ROOM = 32 << 20

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from teamclone.files import held
+from teamclone.system.files import held
 
 DEFAULT_PORT = 6000
 """Of the players; the trainer's is the next, the online coaches' the one after."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from teamclone.errors import PlayError
-from teamclone.files import write_json
+from teamclone.system.files import write_json
 
 FORMAT = 1
 NAME = "match.json"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from teamclone.errors import PlayError
-from teamclone.play.plan import Fixture, ServerSpec, option_words
+from teamclone.play.schedule import Fixture, ServerSpec, option_words
 
 CONNECT_CYCLES_PER_S = 20
 """In synch mode a cycle before the kick-off takes at least 50 ms."""

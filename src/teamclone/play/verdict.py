@@ -12,8 +12,8 @@ from teamclone.logs import find_matches, read_pair
 from teamclone.logs.match import Match, Severity
 from teamclone.play.game import FailedError, who
 from teamclone.play.holes import Holes, count_holes
-from teamclone.play.plan import N_UNUMS, Fixture
 from teamclone.play.record import Fault
+from teamclone.play.schedule import N_UNUMS, Fixture
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
 

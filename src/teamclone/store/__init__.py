@@ -5,6 +5,7 @@ keeps its rows; ``Store`` is what every back end offers, ``parquet`` is the embe
 """
 
 from teamclone.store.ingest import IngestReport, ingest
-from teamclone.store.store import Store, create_store, is_store, open_store
+from teamclone.store.opening import create_store, is_store, open_store
+from teamclone.store.store import Store
 
 __all__ = ["IngestReport", "Store", "create_store", "ingest", "is_store", "open_store"]

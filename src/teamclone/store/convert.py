@@ -14,12 +14,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from teamclone import __version__
-from teamclone.files import digest
 from teamclone.logs import Problem
 from teamclone.logs.match import N_PLAYERS, Columns, Match
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.store import schema
 from teamclone.store.schema import Table
+from teamclone.system.files import digest
 
 Tables = dict[str, pa.Table]
 """Arrow tables by the names of ``schema.MATCH_TABLES``."""

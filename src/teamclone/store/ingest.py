@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from teamclone.errors import LogError, TeamcloneError, UsageError
-from teamclone.files import digest
 from teamclone.logs import LogPair, Severity, find_matches, read_pair
 from teamclone.logs.match import Match
+from teamclone.store.shared import SharedStore
 from teamclone.store.status import FileStatus, Outcome, stamp
 from teamclone.store.store import Added, Store
-from teamclone.store.workers import DIED, Died, SharedStore, run_tasks
+from teamclone.system.files import digest
+from teamclone.system.workers import DIED, Died, run_tasks
 
 OnProgress = Callable[[int, int], None]
 """Called with the matches that are done and their number."""

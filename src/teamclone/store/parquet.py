@@ -21,7 +21,6 @@ import pyarrow.parquet as pq
 
 from teamclone import __version__
 from teamclone.errors import StoreError, UsageError
-from teamclone.files import digest, held, write_atomic
 from teamclone.logs.columns import COUNTERS, counter_name
 from teamclone.logs.match import Columns, Match
 from teamclone.store import convert, schema
@@ -29,6 +28,7 @@ from teamclone.store.convert import Sources, Tables
 from teamclone.store.schema import Table
 from teamclone.store.status import FileStatus
 from teamclone.store.store import Added, Rows
+from teamclone.system.files import digest, held, write_atomic
 
 KIND = "teamclone store"
 MARKER = "store.json"

@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Self
 
-from teamclone.files import digest
+from teamclone.system.files import digest
 
 
 class Outcome(StrEnum):

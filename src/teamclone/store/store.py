@@ -6,10 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from teamclone.errors import UsageError
 from teamclone.logs.match import Columns, Match
 from teamclone.store.status import FileStatus
 
@@ -104,57 +102,3 @@ class Store(Protocol):
         Raises:
             StoreError: another ingest holds it.
         """
-
-
-def create_store(location: str | Path) -> Store:
-    """The store in this folder, or in the schema that a URL ``postgresql://...`` names; made if there is none.
-
-    Raises:
-        StoreError: there is something else, or a store of another format; the server cannot be reached or refuses.
-        UsageError: the URL is wrong.
-    """
-    if url := _url(location):
-        from teamclone.store.postgres import PostgresStore
-
-        return PostgresStore.create(url)
-    from teamclone.store.parquet import ParquetStore
-
-    return ParquetStore.create(Path(location))
-
-
-def open_store(location: str | Path) -> Store:
-    """The store in this folder, or in the schema that a URL ``postgresql://...`` names.
-
-    Raises:
-        StoreError: there is none, or it is of another format; the text names the numbers and the remedy. Or the server
-            cannot be reached or refuses.
-        UsageError: the URL is wrong.
-    """
-    if url := _url(location):
-        from teamclone.store.postgres import PostgresStore
-
-        return PostgresStore.open(url)
-    from teamclone.store.parquet import ParquetStore
-
-    return ParquetStore.open(Path(location))
-
-
-def is_store(location: Path) -> bool:
-    """Whether this folder was made by ``create_store``, of whatever format."""
-    from teamclone.store.parquet import MARKER
-
-    return (location / MARKER).is_file()
-
-
-def _url(location: str | Path) -> str | None:
-    """The location if it is a server's, else None.
-
-    Raises:
-        UsageError: it is the URL of something else.
-    """
-    if isinstance(location, Path) or "://" not in location:
-        return None
-    kind = location.partition("://")[0]
-    if kind not in ("postgresql", "postgres"):
-        raise UsageError(f"expected a folder or postgresql://USER:PASSWORD@HOST:PORT/DATABASE, got a {kind} URL")
-    return location

@@ -11,8 +11,9 @@ from teamclone.errors import LogError, StoreError
 from teamclone.logs import LogPair, Problem, Severity, find_matches, read_pair
 from teamclone.store import convert, schema
 from teamclone.store.checks import Finding, check_match
-from teamclone.store.store import Store, open_store
-from teamclone.store.workers import Died, run_tasks
+from teamclone.store.opening import open_store
+from teamclone.store.store import Store
+from teamclone.system.workers import Died, run_tasks
 
 T = TypeVar("T", LogPair, tuple[str, str])
 

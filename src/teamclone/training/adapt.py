@@ -10,7 +10,7 @@ import numpy as np
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import DatasetError, UsageError
-from teamclone.models.network import model_id
+from teamclone.models.clone import model_id
 from teamclone.training.config import Config, override
 from teamclone.training.run import Base, Run
 

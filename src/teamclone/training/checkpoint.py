@@ -11,7 +11,7 @@ from safetensors import SafetensorError, safe_open
 from torch import nn
 
 from teamclone.errors import RunError
-from teamclone.files import write_atomic
+from teamclone.system.files import write_atomic
 from teamclone.training.optimiser import Optimiser
 
 

@@ -13,7 +13,7 @@ from teamclone.errors import UsageError, choose
 from teamclone.models.config import ACTIVATIONS, ATTENTION_HEADS, BLOCKS, FEATURE_SETS, HEADS, ModelConfig
 from teamclone.rcss.commands import REPERTOIRE, not_of_repertoire
 from teamclone.rcss.player_types import GROUPS
-from teamclone.settings import value_of
+from teamclone.system.settings import value_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,16 +17,16 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 from torch import Tensor
 
-from teamclone.dataset.layout import CODE, DETAIL, MISSING, STEPS
+from teamclone.dataset.layout import CATEGORICAL_INDEX, MEASURED_INDEX, MISSING, STEPS
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
-from teamclone.models.features import BODY_LIMIT_DEG, PaperFeatures, TypeParameters
-from teamclone.models.state import TYPE_FIELD
+from teamclone.models.inputs.paper import BODY_LIMIT_DEG, PaperFeatures, TypeParameters
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import FIELDS
+from teamclone.world.channels import TYPE_FIELD
 
-_VX, _VY, _BODY = (DETAIL[name] for name in ("vx", "vy", "body"))
-_TYPE = CODE["type"]
+_VX, _VY, _BODY = (MEASURED_INDEX[name] for name in ("vx", "vy", "body"))
+_TYPE = CATEGORICAL_INDEX["type"]
 _VELOCITY_STEP, _BODY_STEP = STEPS[_VX], STEPS[_BODY]
 _MAX_X, _MAX_Y, _BODY_LIMIT = (np.float32(limit) for limit in (pitch.MAX_X, pitch.MAX_Y, BODY_LIMIT_DEG))
 _NAN = np.float32(math.nan)
@@ -35,7 +35,7 @@ _FAR, _NEAR = 16, 4
 """How many samples ahead a sample's own entries and those of its frame are asked for. A random frame lies in no cache:
 waiting for it takes three times as long as all arithmetic."""
 _DETAIL_LINES, _POSITION_LINES, _CODE_LINES = 7, 3, 2
-"""Cache lines of 64 bytes of a frame's ``detail``, ``position`` and ``code``."""
+"""Cache lines of 64 bytes of a frame's ``measured``, ``position`` and ``categorical``."""
 
 
 class Gather:
@@ -47,7 +47,7 @@ class Gather:
         self.n_columns = len(features.names)
         self.arguments: tuple[Any, ...] = (
             *(samples[name].numpy() for name in ("frame", "player")),
-            *(frames[name].numpy() for name in ("match", "ball", "position", "detail", "code")),
+            *(frames[name].numpy() for name in ("match", "ball", "position", "measured", "categorical")),
             kinds.reshape(-1, len(FIELDS)),
             kinds.shape[1],
             (kinds[..., TYPE_FIELD["player_speed_max"]] * kinds[..., TYPE_FIELD["player_decay"]]).reshape(-1),
@@ -109,8 +109,8 @@ def _gather(
     frame_match: NDArray[np.int32],
     ball: NDArray[np.float32],
     position: NDArray[np.float32],
-    detail: NDArray[np.int16],
-    code: NDArray[np.uint8],
+    measured: NDArray[np.int16],
+    categorical: NDArray[np.uint8],
     parameters: NDArray[np.float32],
     types_per_match: int,
     speed: NDArray[np.float32],
@@ -142,9 +142,9 @@ def _gather(
             for line in range(_POSITION_LINES):
                 _prefetch(position, frame * 44 + line * 16)
             for line in range(_DETAIL_LINES):
-                _prefetch(detail, frame * detail.shape[1] * detail.shape[2] + line * 32)
+                _prefetch(measured, frame * measured.shape[1] * measured.shape[2] + line * 32)
             for line in range(_CODE_LINES):
-                _prefetch(code, frame * code.shape[1] * code.shape[2] + line * 64)
+                _prefetch(categorical, frame * categorical.shape[1] * categorical.shape[2] + line * 64)
 
         row = rows[index]
         if row < 0 or row >= n_samples:
@@ -157,10 +157,10 @@ def _gather(
             return index
         value[:4] = ball[frame]
         for player in range(22):
-            channels = detail[frame, player]
-            if code[frame, player, _TYPE] >= types_per_match:
+            channels = measured[frame, player]
+            if categorical[frame, player, _TYPE] >= types_per_match:
                 return index
-            kind = first + np.int64(code[frame, player, _TYPE])
+            kind = first + np.int64(categorical[frame, player, _TYPE])
             place[player] = kind
             vx, vy, body = channels[_VX], channels[_VY], channels[_BODY]
             value[4 + player] = position[frame, player, 0]

@@ -21,14 +21,14 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
-from teamclone.files import write_atomic
-from teamclone.models.heads import WITH_BALL, MixtureHead, with_ball
+from teamclone.models.clone import Clone
+from teamclone.models.heads.mixture import WITH_BALL, MixtureHead, with_ball
 from teamclone.models.loss import Balance, ParameterLoss
-from teamclone.models.network import Clone
+from teamclone.system.files import write_atomic
+from teamclone.training.batches import Feed
 from teamclone.training.calibration import Calibration
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
-from teamclone.training.feed import Feed
 from teamclone.training.group import joined, local_rank
 from teamclone.training.optimiser import Optimiser, optimiser_of
 from teamclone.training.run import BASE, BEST, RESUME, Base, Run, create_run, locked, open_run, save_config

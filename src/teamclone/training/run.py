@@ -30,10 +30,10 @@ import torch
 from teamclone import __version__
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError, UsageError
-from teamclone.files import held, write_atomic
-from teamclone.machine import processor
-from teamclone.models.network import Clone
+from teamclone.models.clone import Clone
 from teamclone.rcss.commands import REPERTOIRE
+from teamclone.system.files import held, write_atomic
+from teamclone.system.machine import processor
 from teamclone.training.checkpoint import load_weights, save_weights
 from teamclone.training.config import Config, config_from, to_toml
 

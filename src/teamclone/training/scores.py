@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from teamclone.models.heads import Prediction
+from teamclone.models.heads.mixture import Prediction
 from teamclone.models.loss import Loss, issued, on, projected_parameters
-from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED
 from teamclone.training.group import ALONE, Group
+from teamclone.world.state import Target
 
 
 class Scores:

@@ -13,14 +13,15 @@ import pytest
 import torch
 from tests.synthetic import make_dataset
 
-from teamclone.dataset.layout import FLAG_ON_FIELD, Split
+from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.evaluation.evaluate import predict
-from teamclone.models.network import Clone
-from teamclone.models.relative import RelativeFeatures
-from teamclone.models.state import CHANNEL, State
+from teamclone.models.clone import Clone
+from teamclone.models.inputs.egocentric import RelativeFeatures
 from teamclone.rcss.player_types import DEFAULTS
 from teamclone.training.config import load_config
+from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
+from teamclone.world.state import State
 
 MATCHES = [1, 2, 5, 10, 22]
 

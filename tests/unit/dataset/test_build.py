@@ -25,13 +25,13 @@ import torch
 
 from disk import small_disk
 from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset, is_current
-from teamclone.dataset.layout import FLAG_GOALIE, Split
+from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import ClusterError, DatasetError, StoreError, UsageError
 from teamclone.logs import read_match
-from teamclone.models.state import CHANNEL
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.store import Store, create_store, open_store
+from teamclone.world.channels import CHANNEL, FLAG_GOALIE
 
 TEAM = "HELIOS_base"
 MATCHES = 5

@@ -17,6 +17,7 @@ from teamclone.logs.match import Columns, empty_columns
 from teamclone.rcss import state_bits
 from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.playmodes import SITUATION, PlayMode, Situation
+from teamclone.world import channels
 
 
 def made_match(n_frames: int = 6) -> tuple[Columns, Columns]:
@@ -192,18 +193,18 @@ def test_the_right_team_is_turned_to_attack_plus_x_and_comes_first() -> None:
     execute(players, 0, 12, CommandKind.DASH)
     execute(players, 1, 12, CommandKind.TURN)
     result = clean_match(frames, players, table(command(1, 2, CommandKind.TURN, 40.0, side=-1)), {}, side=-1)
-    detail, code = (result.frames[name][0] for name in ("detail", "code"))
+    detail, code = (result.frames[name][0] for name in ("measured", "categorical"))
     assert result.samples["player"].tolist() == [1]
     assert result.samples["parameters"].tolist() == [[40.0, 0.0]]
     assert result.frames["position"][0, :11, 0].tolist() == [-1.0 * unum for unum in range(1, 12)]
     assert result.frames["position"][0, 11:, 0].tolist() == [20.0] * 11
     assert result.frames["ball"][0].tolist() == [-1.5] * 4
     assert result.frames["score"][0].tolist() == [5, 2]
-    assert detail[1, layout.DETAIL["body"]] == -9000
-    assert detail[1, layout.DETAIL["neck"]] == 1500
-    assert detail[1, layout.DETAIL["vy"]] == -2500
-    assert code[1, layout.CODE["last_command"]] == CommandKind.DASH
-    assert code[0, layout.CODE["flags"]] == layout.FLAG_ON_FIELD | layout.FLAG_GOALIE
+    assert detail[1, layout.MEASURED_INDEX["body"]] == -9000
+    assert detail[1, layout.MEASURED_INDEX["neck"]] == 1500
+    assert detail[1, layout.MEASURED_INDEX["vy"]] == -2500
+    assert code[1, layout.CATEGORICAL_INDEX["last_command"]] == CommandKind.DASH
+    assert code[0, layout.CATEGORICAL_INDEX["flags"]] == channels.FLAG_ON_FIELD | channels.FLAG_GOALIE
 
 
 def test_cycles_without_a_command_are_counted() -> None:
@@ -221,7 +222,7 @@ def test_a_missing_value_is_stored_as_missing() -> None:
     players["capacity"][:] = np.nan
     execute(players, 1, 1, CommandKind.DASH)
     result = clean_match(frames, players, table(command(1, 2, CommandKind.DASH, 1.0, 0.0)), {}, side=1)
-    assert (result.frames["detail"][..., layout.DETAIL["capacity"]] == layout.MISSING).all()
+    assert (result.frames["measured"][..., layout.MEASURED_INDEX["capacity"]] == layout.MISSING).all()
 
 
 def test_set_plays_and_moves_where_they_are_asked_for() -> None:
@@ -357,8 +358,8 @@ def test_a_real_match_beyond_play_on(real: Any, side: int) -> None:
     result = clean_match(*match, side=side, keep=Commands.RECEIVED, repertoire=REPERTOIRE)
     kind, frame, player, executed = (result.samples[name] for name in ("kind", "frame", "player", "executed"))
     given = kind != REPERTOIRE.index("none")
-    flags = result.frames["code"][frame, player, layout.CODE["flags"]]
-    free = (flags & (layout.FLAG_TACKLING | layout.FLAG_CHARGED)) == 0
+    flags = result.frames["categorical"][frame, player, layout.CATEGORICAL_INDEX["flags"]]
+    free = (flags & (channels.FLAG_TACKLING | channels.FLAG_CHARGED)) == 0
     play_on = result.frames["playmode"][frame] == PlayMode.PLAY_ON
     assert executed[given & free & ~play_on].all()
     assert executed[given & free].mean() > 0.9995
@@ -381,10 +382,9 @@ def test_a_real_match_keeps_the_world_through_the_dataset(real: Any) -> None:
         frame = np.searchsorted(real.frames["cycle"], result.frames["cycle"])
         own = slice(0, 11) if side > 0 else slice(11, 22)
         np.testing.assert_allclose(result.frames["position"][:, :11, 0], side * real.players["x"][frame, own])
-        body = result.frames["detail"][:, :11, layout.DETAIL["body"]] * 0.01
+        body = result.frames["measured"][:, :11, layout.MEASURED_INDEX["body"]] * 0.01
         difference = body - real.players["body"][frame, own] - (0 if side > 0 else 180)
         assert np.abs((difference + 180) % 360 - 180).max() < 0.0051
-        size = layout.bytes_per_row(layout.FRAME_ARRAYS) * len(frame)
-        size += layout.bytes_per_row(layout.SAMPLE_ARRAYS) * len(result.samples["kind"])
+        size = sum(values.nbytes for values in (*result.frames.values(), *result.samples.values()))
         # A cycle of play_on; a full match has some 5000.
         assert size / len(frame) < 860

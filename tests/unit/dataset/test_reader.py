@@ -8,14 +8,22 @@ import pytest
 import torch
 from tests.synthetic import make_dataset
 
-from teamclone.dataset.layout import CODE, DETAIL, FRAME_ARRAYS, MISSING, NO_CODE, PLAYER_CHANNELS, SAMPLE_ARRAYS, Split
+from teamclone.dataset.layout import (
+    CATEGORICAL_INDEX,
+    FRAME_ARRAYS,
+    MEASURED_INDEX,
+    MISSING,
+    NO_CODE,
+    SAMPLE_ARRAYS,
+    Split,
+)
 from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import DatasetError
-from teamclone.models.state import CHANNEL, TYPE_FIELD
 from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.world.channels import CHANNEL, PLAYER_CHANNELS, TYPE_FIELD
 
 
 def tiny(folder: Path, **changes: np.ndarray) -> Path:
@@ -25,15 +33,15 @@ def tiny(folder: Path, **changes: np.ndarray) -> Path:
     frames["match"][:] = (0, 1)
     frames["ball"][1] = (1.5, -2.0, 0.25, -0.5)
     frames["position"][1, 7] = (-30.25, 12.5)
-    frames["detail"][1, 7, DETAIL["vx"]] = -1234
-    frames["detail"][1, 7, DETAIL["body"]] = -17999
-    frames["detail"][1, 7, DETAIL["stamina"]] = 31999
-    frames["detail"][1, 7, DETAIL["capacity"]] = 32650
-    frames["code"][1, 7, CODE["type"]] = 2
-    frames["code"][1, 7, CODE["last_command"]] = CommandKind.KICK
-    frames["code"][1, 3, CODE["last_command"]] = CommandKind.CATCH
-    frames["code"][0, 5, CODE["last_command"]] = NO_CODE
-    frames["detail"][0, :, DETAIL["neck"]] = MISSING
+    frames["measured"][1, 7, MEASURED_INDEX["vx"]] = -1234
+    frames["measured"][1, 7, MEASURED_INDEX["body"]] = -17999
+    frames["measured"][1, 7, MEASURED_INDEX["stamina"]] = 31999
+    frames["measured"][1, 7, MEASURED_INDEX["capacity"]] = 32650
+    frames["categorical"][1, 7, CATEGORICAL_INDEX["type"]] = 2
+    frames["categorical"][1, 7, CATEGORICAL_INDEX["last_command"]] = CommandKind.KICK
+    frames["categorical"][1, 3, CATEGORICAL_INDEX["last_command"]] = CommandKind.CATCH
+    frames["categorical"][0, 5, CATEGORICAL_INDEX["last_command"]] = NO_CODE
+    frames["measured"][0, :, MEASURED_INDEX["neck"]] = MISSING
     samples["frame"][:] = (0, 1, 1)
     samples["player"][:] = (5, 7, 3)
     samples["kind"][:] = (0, 2, 1)
@@ -87,10 +95,12 @@ def test_further_commands(tmp_path: Path) -> None:
     assert dataset.commands == REPERTOIRE
     assert set(dataset.samples["kind"].tolist()) == set(range(7))
     # What was done last: CommandKind ids, 0 for nothing.
-    kinds = dataset.frames["code"][dataset.samples["frame"].long(), dataset.samples["player"].long()]
+    kinds = dataset.frames["categorical"][dataset.samples["frame"].long(), dataset.samples["player"].long()]
     last = dataset.last_kind(np.arange(len(dataset)))
     expected = {0: "none", **{CommandKind[name.upper()]: name for name in REPERTOIRE[:-1]}}
-    assert [REPERTOIRE[index] for index in last] == [expected[kind] for kind in kinds[:, CODE["last_command"]].tolist()]
+    assert [REPERTOIRE[index] for index in last] == [
+        expected[kind] for kind in kinds[:, CATEGORICAL_INDEX["last_command"]].tolist()
+    ]
 
 
 @pytest.mark.parametrize("commands", [["dash"], [*CLONED, "none", "catch"], [*CLONED, "jump"]])
@@ -122,8 +132,8 @@ def followed(folder: Path) -> Path:
     frames["cycle"][:] = CYCLES
     frames["ball"][:, 0], frames["ball"][:, 1] = np.arange(10), CYCLES
     frames["position"][:, 3, 0] = -np.arange(10)
-    frames["detail"][:, 3, DETAIL["body"]] = 100 * np.arange(10)
-    frames["detail"][2, 3, DETAIL["neck"]] = MISSING
+    frames["measured"][:, 3, MEASURED_INDEX["body"]] = 100 * np.arange(10)
+    frames["measured"][2, 3, MEASURED_INDEX["neck"]] = MISSING
     samples["frame"][:] = np.arange(10)
     samples["player"][:] = 3
     meta = {"team": "A", "matches": [{"match_id": "a"}, {"match_id": "b"}]}

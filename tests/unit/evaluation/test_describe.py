@@ -13,7 +13,7 @@ from teamclone.evaluation.baselines import Baselines
 from teamclone.evaluation.evaluate import describe, strangers
 from teamclone.evaluation.outcome import Outcome
 from teamclone.evaluation.report import listing, number, percent, points, sentences
-from teamclone.files import write_json
+from teamclone.system.files import write_json
 
 MATCHES = [{"match_id": f"m{index}", "opponent": "Red" if index < 2 else "Blue"} for index in range(12)]
 BASELINES = Baselines(transitions=np.full((5, 4), 9), parameters=np.full(6, 5.0))

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from teamclone.evaluation import figures
-from teamclone.evaluation.pitch import draw_pitch
+from teamclone.plots.pitch import draw_pitch
 
 SCALE = 10  # pixels a metre
 

@@ -15,7 +15,7 @@ from teamclone.models.loss import (
     point_loss,
     projected_parameters,
 )
-from teamclone.models.state import Target
+from teamclone.world.state import Target
 
 TARGET = Target(
     kind=torch.tensor([0, 1, 2, 3]),

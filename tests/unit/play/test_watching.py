@@ -13,12 +13,12 @@ from teamclone.errors import PlayError
 from teamclone.logs import read_match
 from teamclone.logs.match import Match
 from teamclone.play.holes import count_holes
-from teamclone.play.monitor import scene_of
-from teamclone.play.plan import Fixture, Limits, ServerSpec, TeamSpec
 from teamclone.play.ports import DEFAULT_PORT, held_ports, is_free
 from teamclone.play.record import Fault, Record, Side, Trouble, load_record, save_record
+from teamclone.play.schedule import Fixture, Limits, ServerSpec, TeamSpec
 from teamclone.play.server import find_server, gave_up, last_words, met_taken_port, programs_of, server_report
 from teamclone.play.verdict import verdict
+from teamclone.protocol.monitor import scene_of
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.rcss.state_bits import DISCARD

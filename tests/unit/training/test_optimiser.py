@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch import nn
 
-from teamclone.models.network import Clone
+from teamclone.models.clone import Clone
 from teamclone.training.config import load_config
 from teamclone.training.optimiser import Muon, optimiser_of
 

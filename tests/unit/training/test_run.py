@@ -12,7 +12,7 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import RunError
-from teamclone.models.network import Clone
+from teamclone.models.clone import Clone
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import Config, load_config
 from teamclone.training.run import create_run, locked, open_run

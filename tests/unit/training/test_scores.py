@@ -3,11 +3,11 @@ from __future__ import annotations
 import pytest
 import torch
 
+from teamclone.models.clone import Prediction
 from teamclone.models.loss import Loss
-from teamclone.models.network import Prediction
-from teamclone.models.state import Target
 from teamclone.rcss.commands import CLONED
 from teamclone.training.scores import Scores
+from teamclone.world.state import Target
 
 CPU = torch.device("cpu")
 

@@ -1,0 +1,1 @@
+"""What rcssserver computes in a cycle."""

@@ -1,0 +1,217 @@
+"""Each formula of the server, once: elementwise over NumPy arrays, PyTorch tensors or plain numbers.
+
+Lengths in metres, velocities in metres per cycle, angles in radians unless a name says ``_deg``. Parameters of the
+server and of player types are arguments, so that a match is computed by its own. Sources name the files of rcssserver.
+
+The planner's compiled kernels need scalar forms of some of these; `tests/unit/planner/test_formulas.py` holds the two
+equal.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+
+Value = Any
+"""A NumPy array, a PyTorch tensor or a number; all arguments of one call broadcast against each other."""
+
+
+def _of(*values: Value) -> Any:
+    """The library that these values belong to: PyTorch if one is a tensor, else NumPy."""
+    torch = sys.modules.get("torch")
+    return torch if torch is not None and any(isinstance(value, torch.Tensor) for value in values) else np
+
+
+def radians(degrees: Value) -> Value:
+    """Degrees in radians."""
+    return degrees * (math.pi / 180.0)
+
+
+def wrap(angle: Value) -> Value:
+    """The same angle in [-pi, pi)."""
+    return _of(angle).remainder(angle + math.pi, 2 * math.pi) - math.pi
+
+
+def roll(cycles: Value, decay: Value) -> Value:
+    """Metres that a body covers in so many cycles per metre per cycle of its first velocity, if nothing moves it.
+
+    ``object.cpp``: every cycle it moves by its velocity, which is then multiplied by ``decay``. Logs hold velocities
+    after decay, so the first cycle is covered with the velocity as logged.
+    """
+    return (1.0 - decay**cycles) / (1.0 - decay)
+
+
+def cycles_over(distance: Value, speed: Value, decay: Value, *, least: float = 0.0) -> Value:
+    """Cycles after which a body with this speed has covered a distance, the inverse of `roll`; not whole.
+
+    Args:
+        least: what part of the speed is taken to be left where the distance is never covered; with 0 the answer is
+            infinite or not a number there.
+    """
+    left = 1.0 - distance * (1.0 - decay) / speed
+    xp = _of(left)
+    if least:
+        left = xp.clip(left, min=least)
+    return xp.log(left) / (math.log(decay) if isinstance(decay, float) else _of(decay).log(decay))
+
+
+def covered(cycles: Value, acceleration: Value, decay: Value) -> Value:
+    """Metres from rest in so many dashes, each of which adds ``acceleration`` to a velocity that then decays."""
+    return acceleration / (1.0 - decay) * (cycles - decay * (1.0 - decay**cycles) / (1.0 - decay))
+
+
+def kickable_area(player_size: Value, kickable_margin: Value, ball_size: Value) -> Value:
+    """Metres between the centres of player and ball up to which the player can kick it (``player.cpp``)."""
+    return player_size + ball_size + kickable_margin
+
+
+def kick_rate(
+    distance: Value,
+    off_body: Value,
+    *,
+    kick_power_rate: Value,
+    player_size: Value,
+    kickable_margin: Value,
+    ball_size: Value,
+) -> Value:
+    """Metres per cycle that a unit of kick power gives the ball (``player.cpp``, kick).
+
+    Args:
+        distance: between the centres of player and ball.
+        off_body: angle between the body and the ball.
+    """
+    off = abs(wrap(off_body)) / math.pi
+    gap = distance - player_size - ball_size
+    return kick_power_rate * (1.0 - 0.25 * off - 0.25 * gap / kickable_margin)
+
+
+def limited(x: Value, y: Value, most: Value) -> tuple[Value, Value]:
+    """A vector with its length cut to ``most`` (``object.cpp``: accelerations and velocities)."""
+    xp = _of(x, y, most)
+    length = xp.hypot(x, y)
+    factor = xp.where(length > most, most / xp.where(length > most, length, 1.0), 1.0)
+    return x * factor, y * factor
+
+
+def kicked(
+    velocity: tuple[Value, Value],
+    power: Value,
+    direction: Value,
+    rate: Value,
+    *,
+    ball_accel_max: Value,
+    ball_speed_max: Value,
+) -> tuple[Value, Value]:
+    """Velocity of the ball after a single kick, before it moves and decays, without noise (``player.cpp``, kick).
+
+    Args:
+        velocity: of the ball before, as logged.
+        power, direction: of the kick; the direction is that on the pitch: body plus argument.
+        rate: as of `kick_rate`.
+    """
+    xp = _of(direction)
+    x, y = limited(rate * power * xp.cos(direction), rate * power * xp.sin(direction), ball_accel_max)
+    return limited(velocity[0] + x, velocity[1] + y, ball_speed_max)
+
+
+def dash_rate(direction_deg: Value, *, side_dash_rate: Value, back_dash_rate: Value) -> Value:
+    """What part of a dash's power a direction leaves (``player.cpp``, dash).
+
+    Args:
+        direction_deg: off the body, 0..180 degrees.
+    """
+    ahead = side_dash_rate + (1.0 - side_dash_rate) * (1.0 - direction_deg / 90.0)
+    behind = back_dash_rate - (back_dash_rate - side_dash_rate) * (1.0 - (direction_deg - 90.0) / 90.0)
+    xp = _of(direction_deg)
+    return xp.clip(xp.where(direction_deg <= 90.0, ahead, behind), 0.0, 1.0)
+
+
+def turn(moment: Value, speed: Value, inertia_moment: Value) -> Value:
+    """The angle by which a player turns, in the unit of ``moment`` (``player.cpp``, turn).
+
+    Args:
+        speed: of the player, as logged.
+    """
+    return moment / (1.0 + inertia_moment * speed)
+
+
+def tackle_failure(
+    forward: Value,
+    aside: Value,
+    *,
+    tackle_dist: Value,
+    tackle_back_dist: Value,
+    tackle_width: Value,
+    exponent: Value,
+) -> Value:
+    """Probability that a tackle fails, 1 and more where it cannot succeed (``player.cpp``, tackle).
+
+    Args:
+        forward, aside: metres to the ball along the body direction and across it.
+        exponent: tackle_exponent, or foul_exponent where an opponent can kick the ball and a foul is meant.
+    """
+    xp = _of(forward)
+    ahead = forward > 0
+    reach = xp.where(ahead, tackle_dist, tackle_back_dist)
+    # Nothing is reached behind the player where the distance is 0: always a failure.
+    near = xp.where(reach > 0, (abs(forward) / xp.where(reach > 0, reach, 1.0)) ** exponent, 2.0)
+    return near + (abs(aside) / tackle_width) ** exponent
+
+
+def tackle_power(
+    direction: Value,
+    off_body: Value,
+    *,
+    max_tackle_power: Value,
+    max_back_tackle_power: Value,
+    tackle_power_rate: Value,
+) -> Value:
+    """Metres per cycle that a tackle adds to the ball's velocity (``player.cpp``, tackle; clients from version 12).
+
+    Args:
+        direction: argument of the tackle, from the body.
+        off_body: angle between the body and the ball.
+    """
+    power = max_back_tackle_power + (max_tackle_power - max_back_tackle_power) * (1.0 - abs(direction) / math.pi)
+    return power * tackle_power_rate * (1.0 - 0.5 * abs(wrap(off_body)) / math.pi)
+
+
+def rested(
+    stamina: Value,
+    effort: Value,
+    recovery: Value,
+    capacity: Value,
+    *,
+    server: Any,
+    stamina_inc_max: Value,
+    effort_min: Value,
+    effort_max: Value,
+) -> tuple[Value, Value, Value, Value]:
+    """Stamina, effort, recovery and capacity after the end of a cycle (``player.cpp``, updateStamina).
+
+    Args:
+        stamina: what the commands of the cycle have left.
+        server: parameters of the server by name: anything with ``server["stamina_max"]``.
+    """
+    xp = _of(stamina, effort)
+    most = server["stamina_max"]
+    recovers_less = stamina <= server["recover_dec_thr"] * most
+    recovery = xp.where(
+        recovers_less, xp.maximum(recovery - server["recover_dec"], _like(recovery, server["recover_min"])), recovery
+    )
+    falls = stamina <= server["effort_dec_thr"] * most
+    effort = xp.where(falls, xp.maximum(effort - server["effort_dec"], _like(effort, effort_min)), effort)
+    rises = stamina >= server["effort_inc_thr"] * most
+    effort = xp.where(rises, xp.minimum(effort + server["effort_inc"], _like(effort, effort_max)), effort)
+    gain = xp.minimum(recovery * stamina_inc_max, most - stamina)
+    limited_gain = xp.where(_like(gain, server["stamina_capacity"]) >= 0, xp.minimum(gain, capacity), gain)
+    return stamina + limited_gain, effort, recovery, xp.clip(capacity - limited_gain, min=0.0)
+
+
+def _like(values: Value, number: Value) -> Value:
+    """A number as what stands beside it: PyTorch's minimum and maximum take tensors only."""
+    xp = _of(values, number)
+    return number if xp is np else xp.as_tensor(number, dtype=values.dtype, device=values.device)

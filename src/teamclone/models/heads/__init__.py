@@ -1,0 +1,1 @@
+"""Heads: from hidden features to an answer."""

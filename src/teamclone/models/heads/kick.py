@@ -1,0 +1,149 @@
+"""Kicks: the velocity that the ball is to have, from which physics gives power and direction.
+
+A kick adds to the velocity that the ball already has, seen from a body that may face anywhere. What a player wants is
+simpler: the ball with a team mate, in the goal, or so far ahead that he has it again after a few dashes.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from teamclone.models import distributions as mixture
+from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
+from teamclone.models.inputs.egocentric import MATES, geometry_of, mates_of, ways_of
+from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.models.inputs.reach import covered
+from teamclone.planner.plan import WAYS
+from teamclone.rcss import pitch
+
+FREE = 3
+"""Components that begin at the ball itself."""
+DRIBBLES = (1, 2, 3, 4, 5, 7, 10)
+"""Cycles after which a dribbler wants the ball before him."""
+LEAD_M = 12.0
+"""How far from a team mate, the goal's middle or the ball what is aimed at may lie, for an output of 1."""
+TOUCH_M = 3.0
+"""The same of a dribble, from where he then is."""
+AHEAD_M = 0.6
+"""Where a dribbler likes to have the ball."""
+COUNT = MATES + 1 + FREE + len(DRIBBLES)
+USUAL_ERROR = 0.003
+"""Metres per cycle by which the velocity of the ball misses what was planned, before training."""
+IMPOSSIBLE = -30.0
+"""Logit of a way that there is not."""
+
+
+def kick_for(wanted: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
+    """Power, at most 150, and direction, radians from the body, of kicks after which the ball has a velocity.
+
+    Args:
+        wanted: (batch, components, 2) metres per cycle on the pitch.
+    """
+    vx, vy, cos, sin, gain = geometry_of(geometry, "ball_vx", "ball_vy", "cos", "sin", "kick_gain")
+    x, y = wanted[..., 0] - vx, wanted[..., 1] - vy
+    power = torch.sqrt(x.square() + y.square() + 1e-6) / gain.clamp(min=5e-3)
+    return power.clamp(max=150.0), torch.atan2(y * cos - x * sin, x * cos + y * sin)
+
+
+class Planned(nn.Module):
+    """Components of power and direction of a kick, one for each way that a plan knows (`planning.plan`).
+
+    Attributes:
+        error: (WAYS,) logarithm of the velocities by which kicks miss what was planned, in USUAL_ERROR.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.share = nn.Linear(width, len(WAYS))
+        self.error = nn.Parameter(torch.zeros(len(WAYS)))
+
+    def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
+        """As of `Kicks`."""
+        share = self.share(hidden).float()
+        with torch.autocast(hidden.device.type, enabled=False):
+            ways = ways_of(geometry)
+            logits = torch.where(ways[..., 0] > 0, share, IMPOSSIBLE)
+            power, angle = kick_for(ways[..., 1:], geometry)
+            gain = geometry_of(geometry, "kick_gain")[0].clamp(min=5e-3)
+            error = USUAL_ERROR * self.error.exp()
+            return (
+                Mixture(logits, power, LEAST_POWER + error / gain),
+                Mixture(logits, angle, LEAST_ANGLE + error / (gain * power)),
+            )
+
+
+class Kicks(nn.Module):
+    """Mixtures of power and direction of a kick, both with the shares of the same components, COUNT and those planned.
+
+    Args:
+        width: of what a kick is decided on.
+        target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
+        planned: add those of `Planned`; the geometry ends in WAY then.
+    """
+
+    goal: Tensor
+    cycles: Tensor
+
+    def __init__(self, width: int, target_width: int = 0, *, planned: bool = False) -> None:
+        super().__init__()
+        self.layer = nn.Linear(width, 6 * COUNT)
+        self.target = nn.Linear(target_width, 6) if target_width else None
+        self.planned = Planned(width) if planned else None
+        self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
+        self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
+
+    def forward(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None = None) -> tuple[Mixture, Mixture]:
+        """Power and direction (radians from the body).
+
+        Args:
+            hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
+            targets: (batch, TARGETS, target width), None for nothing.
+        """
+        free = self._free(hidden, geometry, targets)
+        if self.planned is None:
+            return free
+        power, angle = (mixture.side_by_side(pair) for pair in zip(free, self.planned(hidden, geometry), strict=True))
+        return power, angle
+
+    def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:
+        """Those that the network moves about."""
+        raw = self.layer(hidden).float().view(-1, 6, COUNT)
+        if self.target is not None and targets is not None:
+            # The components begin with the team mates and the goal.
+            raw = raw + functional.pad(self.target(targets).float().transpose(1, 2), (0, COUNT - MATES - 1))
+        with torch.autocast(hidden.device.type, enabled=False):
+            logits, ahead, aside, speed, power_scale, angle_scale = raw.unbind(1)
+            aimed = COUNT - len(DRIBBLES)
+            wanted = torch.cat(
+                [
+                    self._aimed(ahead[:, :aimed], aside[:, :aimed], speed[:, :aimed], geometry),
+                    self._dribbled(ahead[:, aimed:], aside[:, aimed:], geometry),
+                ],
+                1,
+            )
+            power, angle = kick_for(wanted, geometry)
+            return (
+                Mixture(logits, power, scale_of(power_scale, least=LEAST_POWER, typical=5.0)),
+                Mixture(logits, angle, scale_of(angle_scale, least=LEAST_ANGLE, typical=6 * DEGREE)),
+            )
+
+    def _aimed(self, ahead: Tensor, aside: Tensor, speed: Tensor, geometry: Tensor) -> Tensor:
+        """(batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""
+        mates = mates_of(geometry)
+        ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)[:, None]
+        base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, FREE, -1)], 1)
+        way = base + LEAD_M * torch.stack([ahead, aside], -1) - ball
+        direction = way / torch.sqrt(way.square().sum(-1, keepdim=True) + 1e-6)
+        return direction * (BALL_SPEED_MAX * torch.sigmoid(speed))[..., None]
+
+    def _dribbled(self, ahead: Tensor, aside: Tensor, geometry: Tensor) -> Tensor:
+        """(batch, components, 2) velocities that bring the ball before him after a kick and dashes straight on."""
+        decay, forward, sideways, gain = geometry_of(geometry, "decay", "forward", "aside", "dash_gain")
+        coasted = (1 - decay**self.cycles) / (1 - decay)
+        run = forward * coasted + covered(self.cycles - 1, 100.0 * gain, decay)
+        along, across = run + AHEAD_M + TOUCH_M * ahead, sideways * coasted + TOUCH_M * aside
+        x, y, cos, sin, ball_x, ball_y = geometry_of(geometry, "x", "y", "cos", "sin", "ball_x", "ball_y")
+        way = torch.stack([x + along * cos - across * sin - ball_x, y + along * sin + across * cos - ball_y], -1)
+        return way * ((1 - BALL_DECAY) / (1 - BALL_DECAY**self.cycles))[:, None]

@@ -1,0 +1,1 @@
+"""Inputs of a network: from the state of the game to numbers around zero."""

@@ -1,0 +1,332 @@
+"""A plan's matches, one after the other or many at once: resumed where it stopped, tried again where one failed.
+
+In the folder of a plan, ``matches/ID`` is a whole match and appears at once, ``failed/ID/N`` is what is left of attempt
+N, whose logs no reader takes for logs. What is being played lies in ``.playing``.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import uuid
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from teamclone.errors import PlayError, StoreError, UsageError
+from teamclone.play.processes import kill_marked
+from teamclone.play.record import Fault, Record, Side, Trouble, bury_logs, load_record, save_record
+from teamclone.play.schedule import Fixture, Plan
+from teamclone.play.server import find_server
+from teamclone.play.supervisor import STOPPED, Order
+from teamclone.store.ingest import ingest
+from teamclone.store.store import Store
+from teamclone.system.files import held
+from teamclone.system.workers import Died, available_cpus, run_tasks
+
+MATCHES = "matches"
+FAILED = "failed"
+_PLAYING = ".playing"
+_LOCK = ".lock"
+_POLL_S = 0.2
+_END_S = 30.0
+"""How long a keeper has to end its match."""
+
+OnRecord = Callable[[Record], None]
+"""Called with what became of a match, as soon as that is known."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlayReport:
+    """What became of each match of a plan.
+
+    Attributes:
+        records: of all matches, in the order of the plan: the match, or the last attempt at it.
+        played: how many were played now; the others were there before.
+        seconds: how long it took.
+    """
+
+    records: tuple[Record, ...]
+    played: int
+    seconds: float
+
+    @property
+    def failed(self) -> tuple[Record, ...]:
+        return tuple(record for record in self.records if not record.complete)
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "matches": len(self.records),
+            "complete": len(self.records) - len(self.failed),
+            "failed": len(self.failed),
+            "played": self.played,
+            "seconds": round(self.seconds, 2),
+            "records": [record.to_json() for record in self.records],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Task:
+    """``wanted`` is a file that is there as long as the match is wanted; all machines see ``out``."""
+
+    fixture: Fixture
+    attempts: int
+    out: Path
+    wanted: Path
+
+
+def play(
+    plan: Plan,
+    out: Path,
+    *,
+    store: Store | None = None,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+    on_record: OnRecord = lambda record: None,
+) -> PlayReport:
+    """Play what is missing of a plan.
+
+    A match that failed is tried up to ``plan.attempts`` times, then it counts as failed, also for the next call. When
+    this ends, however it ends, servers and clients end with it.
+
+    Args:
+        out: where the matches go; with those of an earlier call that was stopped or killed.
+        store: each match is added to it as it ends, and those that were there before.
+        executor: where matches are played, for example on a cluster (``cluster.executor_of``); its workers must see
+            ``out`` and the teams under the same paths. None plays on this machine.
+        jobs: how many at once, None for one a processor; in real time, where it must not be busy, one for two.
+        retry_failed: forget the attempts at matches that failed before.
+        on_progress: told how many matches are accounted for, and how many there are.
+
+    Raises:
+        UsageError: ``out`` holds matches of another plan, or a worker does not see it.
+        PlayError: there is no server, another process plays into ``out``, or the disk is full; what was played stays.
+        StoreError: the store cannot be written.
+        ClusterError: the connection to the executor's workers was lost.
+    """
+    start = time.monotonic()
+    out = out.resolve()
+    if executor is None:
+        find_server(plan.fixtures[0].server)
+    for folder in (out / MATCHES, out / FAILED):
+        folder.mkdir(parents=True, exist_ok=True)
+    lock = out / _LOCK
+    lock.touch()
+    with ExitStack() as stack:
+        stack.enter_context(held(lock, busy=PlayError(f"{out}: another process plays into it; wait for its end")))
+        _clear(out / _PLAYING)
+        stack.callback(_clear, out / _PLAYING)
+        # A folder of its own: workers that do not know yet that an earlier call is over may still write into theirs.
+        wanted = out / _PLAYING / uuid.uuid4().hex[:8] / "wanted"
+        wanted.parent.mkdir(parents=True)
+        wanted.touch()
+        if retry_failed:
+            for fixture in plan.fixtures:
+                shutil.rmtree(out / FAILED / fixture.id, ignore_errors=True)
+        known = {fixture.id: _known(fixture, plan.attempts, out) for fixture in plan.fixtures}
+        records = {name: record for name, record in known.items() if record is not None}
+        stored = _Stored(out, store)
+        stored.add([record for record in records.values() if record.complete])
+        tasks = [
+            _Task(fixture=fixture, attempts=plan.attempts, out=out, wanted=wanted)
+            for fixture in plan.fixtures
+            if fixture.id not in records
+        ]
+        on_progress(len(records), len(plan.fixtures))
+        if executor is None:
+            threads = jobs or max(1, available_cpus() // (1 if plan.fixtures[0].server.synch else 2))
+            executor = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="match"))
+        stop = partial(wanted.unlink, missing_ok=True)
+        stack.callback(stop)
+        for task, result in run_tasks(_play_match, tasks, executor=executor, on_stop=stop):
+            record = _lost(task) if isinstance(result, Died) else result
+            records[task.fixture.id] = record
+            on_record(record)
+            if record.trouble and record.trouble.fault is Fault.DISK_FULL:
+                raise PlayError(
+                    f"{out}: {record.trouble.text}; make room and give the same command again, what was played stays"
+                )
+            with suppress(StoreError):  # busy, perhaps: tried again with the next match, and at the end
+                stored.add([record] if record.complete else [])
+            on_progress(len(records), len(plan.fixtures))
+        stored.add([])
+    return PlayReport(
+        records=tuple(records[fixture.id] for fixture in plan.fixtures),
+        played=len(tasks),
+        seconds=time.monotonic() - start,
+    )
+
+
+def _clear(playing: Path) -> None:
+    """Remove what is half played, with the processes that still play it."""
+    kill_marked(playing)
+    shutil.rmtree(playing, ignore_errors=True)
+
+
+def _known(fixture: Fixture, attempts: int, out: Path) -> Record | None:
+    """The match, or the last of its attempts if there may be no more.
+
+    Raises:
+        UsageError: what lies there was asked for otherwise.
+    """
+    record = load_record(out / MATCHES / fixture.id)
+    tries = _attempts(fixture, out)
+    last = record or (tries[-1] if tries else None)
+    if last is not None and last.fingerprint != fixture.fingerprint:
+        raise UsageError(
+            f"{fixture.id}: was played in {out} with other commands, options or seed than the plan has now; "
+            "choose another --out, or remove this match there"
+        )
+    return record or (last if len(tries) >= attempts else None)
+
+
+def _attempts(fixture: Fixture, out: Path) -> list[Record]:
+    """Failed attempts, the first first."""
+    folders = (out / FAILED / fixture.id).glob("*")
+    found = [load_record(folder) for folder in sorted(folders, key=lambda folder: (len(folder.name), folder.name))]
+    return [record for record in found if record is not None]
+
+
+class _Stored:
+    """The matches of a folder, as they go into a store."""
+
+    def __init__(self, out: Path, store: Store | None) -> None:
+        self._matches, self._store = out / MATCHES, store
+        self._waiting: list[Record] = []
+        if store is not None:
+            with store.writing():  # what cannot be written is told at once
+                pass
+
+    def add(self, records: Sequence[Record]) -> None:
+        """Add these, and those that could not be added before.
+
+        Raises:
+            StoreError: the store cannot be written now; they are kept for the next time.
+        """
+        self._waiting += records
+        if self._store is not None and self._waiting:
+            ingest([self._matches / record.id for record in self._waiting], self._store, jobs=1)
+        self._waiting = []
+
+
+def _play_match(task: _Task) -> Record:
+    """Runs in a thread, here or on a worker of a cluster: a match, in as many attempts as it takes.
+
+    Raises:
+        UsageError: this machine does not see the folder, or the match is no longer wanted.
+        PlayError: there is no server.
+    """
+    if not task.wanted.exists():
+        raise UsageError(
+            f"{task.out}: the worker on {platform.node()} does not see this folder; put it on a file system that all "
+            "machines have under the same path"
+        )
+    server = find_server(task.fixture.server)
+    home = task.out / MATCHES / task.fixture.id
+    record: Record | None = load_record(home)  # of a worker that died before it could tell
+    for attempt in range(1 + len(_attempts(task.fixture, task.out)), 1 + task.attempts):
+        if record is not None and record.complete:
+            break
+        folder = task.wanted.with_name(f"{task.fixture.id}.{uuid.uuid4().hex[:8]}")
+        folder.mkdir()
+        record = _attempt(Order(fixture=task.fixture, folder=folder, server=server, attempt=attempt), task.wanted)
+        if record.trouble and record.trouble.fault is Fault.DISK_FULL:
+            shutil.rmtree(folder, ignore_errors=True)
+            break
+        if record.complete:
+            _put(folder, home)
+        else:
+            (task.out / FAILED / task.fixture.id).mkdir(exist_ok=True)
+            _put(folder, task.out / FAILED / task.fixture.id / str(attempt))
+    if record is None:
+        raise AssertionError("a match with no attempt left was not to be played")
+    return record
+
+
+def _attempt(order: Order, wanted: Path) -> Record:
+    """One attempt, by a keeper.
+
+    Raises:
+        UsageError: the match is no longer wanted.
+    """
+    with tempfile.TemporaryFile() as answer, (order.folder / "keeper.txt").open("wb") as errors:
+        keeper = subprocess.Popen(
+            (sys.executable, "-P", "-m", "teamclone.play.supervisor"),
+            stdin=subprocess.PIPE,
+            stdout=answer,
+            stderr=errors,
+            start_new_session=True,  # Ctrl-C is for us; we then ask the keepers
+        )
+        assert keeper.stdin is not None
+        with keeper.stdin as order_stream:
+            with suppress(BrokenPipeError):
+                order_stream.write(json.dumps(order.to_json()).encode() + b"\n")
+                order_stream.flush()
+            while keeper.poll() is None and wanted.exists():
+                with suppress(subprocess.TimeoutExpired):
+                    keeper.wait(_POLL_S)
+        try:
+            code = keeper.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            keeper.kill()
+            code = keeper.wait()
+            kill_marked(order.folder)
+        if code == STOPPED or not wanted.exists():
+            raise UsageError(f"{order.fixture.id}: is no longer wanted")
+        answer.seek(0)
+        with suppress(ValueError, KeyError, TypeError):
+            return Record.from_json(json.loads(answer.read()))
+    kill_marked(order.folder)
+    words = (order.folder / "keeper.txt").read_text("utf-8", "replace").strip().splitlines()
+    text = (
+        f"the process that looked after the match ended with code {code}: {words[-1] if words else 'it said nothing'}"
+    )
+    record = _without_keeper(order.fixture, order.attempt, text)
+    bury_logs(order.folder)
+    save_record(order.folder, record)
+    return record
+
+
+def _put(folder: Path, home: Path) -> None:
+    """Rename a folder into place; another worker may have been quicker."""
+    (folder / "keeper.txt").unlink(missing_ok=True)
+    try:
+        folder.rename(home)
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+        if load_record(home) is not None:
+            shutil.rmtree(folder)
+            return
+        shutil.rmtree(home)
+        folder.rename(home)
+
+
+def _lost(task: _Task) -> Record:
+    return _without_keeper(task.fixture, task.attempts, "the workers that played it died; it is tried again next time")
+
+
+def _without_keeper(fixture: Fixture, attempt: int, text: str) -> Record:
+    return Record(
+        id=fixture.id,
+        fingerprint=fixture.fingerprint,
+        attempt=attempt,
+        left=Side(team=fixture.left.name),
+        right=Side(team=fixture.right.name),
+        trouble=Trouble(fault=Fault.KEEPER_DIED, text=text),
+        machine=platform.node(),
+        cpus=os.cpu_count() or 1,
+    )

@@ -1,0 +1,1 @@
+"""What rcssserver and its clients send each other."""

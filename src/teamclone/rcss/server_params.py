@@ -1,0 +1,103 @@
+"""Parameters of the server that decide what happens in a cycle, with their defaults (rcssserver `serverparam.cpp`).
+
+A log names those of its match. Whoever computes with one takes it from there: `number` and `vector` fall back to the
+default of the server's version where an older log leaves one out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+DEFAULTS: dict[str, float] = {
+    # The ball.
+    "ball_size": 0.085,
+    "ball_decay": 0.94,
+    "ball_rand": 0.05,
+    "ball_speed_max": 3.0,
+    "ball_accel_max": 2.7,
+    # Players, beside what their type says (`player_types`).
+    "player_rand": 0.1,
+    "player_accel_max": 1.0,
+    "kick_rand": 0.1,
+    # Stamina.
+    "stamina_max": 8000.0,
+    "stamina_capacity": 130600.0,
+    "recover_dec_thr": 0.3,
+    "recover_dec": 0.002,
+    "recover_min": 0.5,
+    "effort_dec_thr": 0.3,
+    "effort_dec": 0.005,
+    "effort_inc_thr": 0.6,
+    "effort_inc": 0.01,
+    # Arguments of commands.
+    "min_dash_power": 0.0,
+    "max_dash_power": 100.0,
+    "min_dash_angle": -180.0,
+    "max_dash_angle": 180.0,
+    "dash_angle_step": 1.0,
+    "side_dash_rate": 0.4,
+    "back_dash_rate": 0.7,
+    "minmoment": -180.0,
+    "maxmoment": 180.0,
+    "minpower": -100.0,
+    "maxpower": 100.0,
+    "min_catch_angle": -90.0,
+    "max_catch_angle": 90.0,
+    # Tackles and catches.
+    "tackle_dist": 2.0,
+    "tackle_back_dist": 0.0,
+    "tackle_width": 1.25,
+    "tackle_exponent": 6.0,
+    "foul_exponent": 10.0,
+    "tackle_cycles": 10.0,
+    "tackle_power_rate": 0.027,
+    "max_tackle_power": 100.0,
+    "max_back_tackle_power": 0.0,
+    "tackle_rand_factor": 2.0,
+    "catchable_area_l": 1.2,
+    "catchable_area_w": 1.0,
+    "catch_probability": 1.0,
+    "catch_ban_cycle": 5.0,
+    # Time.
+    "half_time": 300.0,
+    "nr_normal_halfs": 2.0,
+    "extra_half_time": 100.0,
+    "nr_extra_halfs": 2.0,
+    "simulator_step": 100.0,
+}
+"""Those of version 19."""
+
+_BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
+    (17, {"back_dash_rate": 0.6, "min_catch_angle": -180.0, "max_catch_angle": 180.0, "min_dash_power": -100.0}),
+)
+"""Defaults of servers before a version, where they differ."""
+
+FIELDS = tuple(DEFAULTS)
+"""The order of the parameters wherever they stand in an array, ``World.server``."""
+SERVER_FIELD = {name: index for index, name in enumerate(FIELDS)}
+"""Index of a parameter there."""
+
+SERVER_DEFAULTS = np.array(list(DEFAULTS.values()))
+"""(len(FIELDS),) float64, DEFAULTS as `vector` has them."""
+
+
+def default(name: str, *, version: int | None = None) -> float:
+    """The default of a parameter in a version of the server, the newest if None."""
+    for before, values in _BEFORE:
+        if version is not None and version < before and name in values:
+            return values[name]
+    return DEFAULTS[name]
+
+
+def number(params: Mapping[str, float | str], name: str, *, version: int | None = None) -> float:
+    """A parameter of a match: what its log says, the default of its server's version where the log has no number."""
+    value = params.get(name)
+    return float(value) if isinstance(value, int | float) else default(name, version=version)
+
+
+def vector(params: Mapping[str, float | str], *, version: int | None = None) -> NDArray[np.float64]:
+    """(len(FIELDS),) all of FIELDS of a match, as `number` has them."""
+    return np.array([number(params, name, version=version) for name in FIELDS])

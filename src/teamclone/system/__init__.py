@@ -1,0 +1,1 @@
+"""What the rest stands on: files, settings, processes, the machine. Knows nothing of football."""

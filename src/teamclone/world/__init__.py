@@ -1,0 +1,1 @@
+"""What one cycle looks like to a team."""

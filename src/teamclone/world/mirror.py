@@ -1,0 +1,81 @@
+"""The game reflected at the long axis: what is left becomes right, and players change places with their counterparts.
+
+The simulator does not know left from right, so the mirrored command is right in the mirrored situation, if the team
+plays the same on both sides. A player's role hangs on his number, hence the left back becomes the right back.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from teamclone.rcss.commands import CLONED, parameters_of
+from teamclone.world.channels import CHANNEL
+from teamclone.world.state import State, Target
+
+TEAM = 11
+"""Players of the modelled team, who come first."""
+_BALL = torch.tensor([1.0, -1.0, 1.0, -1.0])
+_CHANNELS = torch.ones(len(CHANNEL))
+_CHANNELS[[CHANNEL[name] for name in ("y", "vy", "body", "neck")]] = -1.0
+
+
+@cache
+def _arguments(commands: tuple[str, ...]) -> Tensor:
+    """(commands, 2) -1 for arguments that change their sign."""
+    signs = torch.ones(len(commands), 2)
+    for item in parameters_of(commands):
+        if item.sided:
+            signs[commands.index(item.kind.name.lower()), item.argument] = -1.0
+    return signs
+
+
+def mirror_state(state: State, places: Tensor) -> State:
+    """The situations reflected: y, vy, body and neck negated, now and before; every player in his counterpart's place.
+
+    Args:
+        places: (22,) int64, as `mirror_places` gives them: who is whose counterpart.
+    """
+    ball, channels = _BALL.to(state.ball), _CHANNELS.to(state.players)
+    return State(
+        ball=state.ball * ball,
+        players=state.players.index_select(1, places) * channels,
+        types=state.types.index_select(1, places),
+        actor=places[state.actor],
+        past_ball=state.past_ball * ball,
+        past_players=state.past_players.index_select(2, places) * channels,
+        past_known=state.past_known,
+        mode=state.mode,
+        mode_cycles=state.mode_cycles,
+    )
+
+
+def mirror_target(target: Target, commands: tuple[str, ...] = CLONED) -> Target:
+    """The commands reflected: turn moments, directions and the y of places negated."""
+    return Target(target.kind, target.parameters * _arguments(commands).to(target.parameters)[target.kind])
+
+
+def mirror_places(mean: NDArray[np.floating]) -> Tensor:
+    """(22,) int64: each player's counterpart, and his counterpart's counterpart is himself.
+
+    Of the modelled team he is found by the least squared distance, summed over the team, between where each player
+    stands on average and where each stands mirrored. Opponents keep their places: they are many teams, whose numbers
+    mean different roles, and no input but the paper's knows an opponent by his number.
+
+    Args:
+        mean: (22, 2) metres, each player's mean position; not a number where he never played, who is his own.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    # Far away, who never played costs nothing as his own counterpart and much as another's.
+    team = np.where(np.isfinite(mean[:TEAM]), mean[:TEAM], (1e4, 0.0))
+    cost = np.square(team[:, None] - team[None] * (1.0, -1.0)).sum(-1)
+    # The costs are symmetric, so that the best matching is its own inverse, unless several are equally good.
+    found = linear_sum_assignment(cost)[1]
+    number = np.arange(TEAM)
+    pairs = np.where(found[found] == number, found, number)
+    return torch.from_numpy(np.concatenate([pairs, np.arange(TEAM, 2 * TEAM)]))

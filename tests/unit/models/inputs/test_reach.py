@@ -1,0 +1,288 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.situations import put, resting, situations
+from torch import Tensor
+
+from teamclone.models.inputs.reach import (
+    NEVER,
+    STEPS,
+    Reach,
+    ball_after,
+    covered,
+    dash_rate,
+    kick_rate,
+    kickable_area,
+    reach_ball,
+    tackle_failure,
+)
+from teamclone.rcss.player_types import DEFAULTS, RANGES
+from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD, TYPE_FIELD
+from teamclone.world.state import State
+
+MATE, OPPONENT = 5, 15
+TYPE = torch.tensor(list(DEFAULTS.values()), dtype=torch.float64)
+AREA = 0.3 + 0.085 + 0.7
+
+
+def of_type(**values: float) -> Tensor:
+    types = TYPE.clone()
+    for name, value in values.items():
+        types[TYPE_FIELD[name]] = value
+    return types
+
+
+def reach_of(state: State, *, held: bool = False) -> Reach:
+    whole = torch.full((len(state.ball),), held)
+    return reach_ball(state.ball, state.players, state.types, held=whole, actor=state.actor)
+
+
+def one_at(
+    player: int, x: float, *, types: Tensor = TYPE, ball: tuple[float, ...] = (0, 0, 0, 0), **values: float
+) -> float:
+    """Cycles of a player of that type on the field at (x, 0) or where ``values`` say."""
+    state = resting(dtype=torch.float64)
+    state.ball[0] = torch.tensor(ball, dtype=torch.float64)
+    state.types[:] = types
+    put(state, 0, x=-50.0)
+    put(state, player, **{"x": x, **values})
+    return float(reach_of(state).steps[0, player])
+
+
+def test_the_ball_rolls_as_the_server_moves_it() -> None:
+    state = resting(2, dtype=torch.float64)
+    state.ball[0] = torch.tensor([3.0, -4.0, 2.0, -1.0])
+    x, y, vx, vy = state.ball[0].tolist()
+    path = reach_of(state).ball
+    assert path.shape == (2, STEPS + 1, 2)
+    for place in path[0].tolist():
+        assert place == pytest.approx([x, y])
+        # Logged velocity is after decay: the next move is it, then it decays.
+        x, y, vx, vy = x + vx, y + vy, vx * 0.94, vy * 0.94
+    assert (path[1] == 0).all()
+
+
+def test_a_held_ball_stays() -> None:
+    state = resting(dtype=torch.float64)
+    state.ball[0] = torch.tensor([3.0, -4.0, 2.0, -1.0])
+    assert reach_of(state, held=True).ball.eq(torch.tensor([3.0, -4.0])).all()
+
+
+def test_ball_after_some_cycles() -> None:
+    state = situations(4)
+    reach = reach_of(state)
+    steps = torch.tensor([0.0, 7.4, 40.0, 99.0])
+    for row, cycle in enumerate((0, 7, 40, 40)):
+        assert torch.equal(ball_after(reach, steps)[row], reach.ball[row, cycle])
+
+
+def dashes(distance: float, types: Tensor, *, area: float) -> int:
+    """Full dashes from rest until the ball is within the area, as the server adds them up."""
+    power = 100 * float(types[TYPE_FIELD["dash_power_rate"]] * types[TYPE_FIELD["effort_max"]])
+    decay = float(types[TYPE_FIELD["player_decay"]])
+    moved, speed, cycles = 0.0, 0.0, 0
+    while distance - moved > area:
+        speed += power
+        moved += speed
+        speed *= decay
+        cycles += 1
+    return cycles
+
+
+@given(cycles=st.integers(0, 40), acceleration=st.floats(0.1, 0.9), decay=st.floats(*RANGES["player_decay"]))
+@settings(max_examples=40)
+def test_metres_covered_are_the_sum_of_the_dashes(cycles: int, acceleration: float, decay: float) -> None:
+    moved, speed = 0.0, 0.0
+    for _ in range(cycles):
+        speed += acceleration
+        moved += speed
+        speed *= decay
+    got = covered(*(torch.tensor(value, dtype=torch.float64) for value in (cycles, acceleration, decay)))
+    assert float(got) == pytest.approx(moved, abs=1e-9)
+
+
+@given(
+    distance=st.floats(0, 20),
+    player=st.sampled_from([0, MATE, OPPONENT]),
+    dash_power_rate=st.floats(*RANGES["dash_power_rate"]),
+    player_decay=st.floats(*RANGES["player_decay"]),
+    effort_max=st.floats(*RANGES["effort_max"]),
+    margin=st.floats(*RANGES["kickable_margin"]),
+)
+@settings(max_examples=60)
+def test_cycles_to_a_resting_ball_straight_ahead(distance: float, player: int, margin: float, **motion: float) -> None:
+    types = of_type(kickable_margin=margin, **motion)
+    area = 0.3 + 0.085 + margin - (0.2 if player == MATE else 0)
+    expected = {dashes(distance, types, area=area + slack) for slack in (-1e-4, 1e-4)}
+    assert one_at(player, -distance, types=types) in expected
+
+
+def test_cycles_by_hand() -> None:
+    # 0.6 m, then 0.6 + 0.4 * 0.6, then 0.936: 1.5, 2.1 and 2.4 m beyond the area need three, three and four dashes.
+    assert one_at(OPPONENT, -AREA - 1.5) == 3
+    assert one_at(OPPONENT, -AREA - 0.59) == 1
+    assert one_at(OPPONENT, -AREA - 0.61) == 2
+    assert one_at(OPPONENT, -AREA - 1.43) == 2
+    assert one_at(OPPONENT, -AREA - 2.37) == 3
+    assert one_at(OPPONENT, -AREA + 0.01) == 0
+    # A team mate's reach is taken 0.2 m short.
+    assert one_at(MATE, -AREA + 0.01) == 1
+
+
+def test_a_needed_turn_costs_a_cycle() -> None:
+    straight = one_at(OPPONENT, -20)
+    assert one_at(OPPONENT, -20, body=14.9) == straight
+    assert one_at(OPPONENT, -20, body=-15.1) == straight + 1
+    assert one_at(OPPONENT, -20, body=179.0) == straight + 1
+    # Near the ball he runs backwards.
+    assert one_at(OPPONENT, -9, body=179.0) == one_at(OPPONENT, -9)
+
+
+def test_who_runs_fast_turns_little() -> None:
+    """Half a metre per cycle and an inertia of 7 leave 180 / 4.5 = 40 degrees of a turn, then 180 / 2.4 = 75."""
+    types = of_type(inertia_moment=7.0, player_decay=0.4)
+    still = one_at(OPPONENT, -30, types=types)
+    cycles = {
+        body: one_at(OPPONENT, -30 - 0.5 / 0.6, types=types, body=body, vx=0.5) for body in (10.0, 50.0, 60.0, 140.0)
+    }
+    assert cycles == {10.0: still, 50.0: still + 1, 60.0: still + 2, 140.0: still + 3}
+
+
+def test_the_actor_dashes_sideways() -> None:
+    # Across 0.4 of the power is left: 0.24 m in a dash, 0.58 in two; others turn, then dash 0.6 m.
+    assert one_at(0, -AREA - 0.23, body=90.0) == 1
+    assert one_at(0, -AREA - 0.25, body=90.0) == 2
+    assert one_at(OPPONENT, -AREA - 0.23, body=90.0) == 2
+
+
+def test_a_ball_that_comes_is_waited_for() -> None:
+    # It rolls 1, .94, .8836, ...: 2.8236 m in three cycles; the player 3.5 m away stands with his back to it.
+    assert one_at(OPPONENT, AREA + 2.8, ball=(0, 0, 1, 0), body=90.0) <= 3
+    assert one_at(OPPONENT, -9 - AREA, ball=(0, 0, 1, 0)) > one_at(OPPONENT, -9 - AREA)
+
+
+def test_far_players_run_on_at_full_speed() -> None:
+    # 39.333 m in 40 dashes (1 m each less 2/3), then 1 m a cycle.
+    assert one_at(OPPONENT, -AREA - 39.3) == 40
+    assert one_at(OPPONENT, -AREA - 45) == pytest.approx(40 + 45 - (40 - 2 / 3), abs=1e-6)
+    # Nobody is given more than one who is not there.
+    assert one_at(OPPONENT, 57, ball=(-57, 0, -2.7, 0)) == NEVER
+
+
+def test_players_off_the_field_never_have_it() -> None:
+    state = situations(50)
+    gone = torch.rand(50, 22, generator=torch.Generator().manual_seed(1)) < 0.3
+    flags = state.players[..., CHANNEL["flags"]]
+    state.players[..., CHANNEL["flags"]] = torch.where(gone, flags - FLAG_ON_FIELD, flags)
+    before, steps = reach_of(situations(50)).steps, reach_of(state).steps
+    assert (steps[gone] == NEVER).all()
+    assert torch.equal(steps[~gone], before[~gone])
+
+
+def plainly(state: State, row: int, player: int, *, slack: float) -> float:
+    """The same model cycle by cycle, for a player who is not the actor."""
+    x, y, vx, vy, body = (float(state.players[row, player, CHANNEL[name]]) for name in ("x", "y", "vx", "vy", "body"))
+    bx, by, bvx, bvy = state.ball[row].tolist()
+    types = state.types[row, player]
+    decay, inertia = float(types[TYPE_FIELD["player_decay"]]), float(types[TYPE_FIELD["inertia_moment"]])
+    area = float(kickable_area(types)) - (0.2 if player < 11 else 0) + slack
+    initial_speed = math.hypot(vx, vy)
+    for cycle in range(STEPS + 1):
+        distance = math.hypot(bx - x, by - y)
+        if distance <= area:
+            return cycle
+        angle = abs(math.remainder(math.degrees(math.atan2(by - y, bx - x)) - body, 360))
+        if distance < 10 and angle > 90:
+            angle = 180 - angle
+        margin = max(15.0, math.degrees(math.asin(area / distance)))
+        turns, speed = 0, initial_speed
+        while angle > margin and turns < 3:
+            angle -= 180 / (1 + inertia * speed)
+            speed *= decay
+            turns += 1
+        if turns + dashes(distance, types, area=area) <= cycle:
+            return cycle
+        x, y, vx, vy = x + vx, y + vy, vx * decay, vy * decay
+        bx, by, bvx, bvy = bx + bvx, by + bvy, bvx * 0.94, bvy * 0.94
+    return math.inf
+
+
+def test_all_players_are_reckoned_as_one_by_one() -> None:
+    state = situations(12, seed=3, dtype=torch.float64)
+    steps = reach_of(state).steps
+    compared = 0
+    for row in range(12):
+        for player in range(22):
+            expected = {plainly(state, row, player, slack=slack) for slack in (-1e-6, 0, 1e-6)}
+            if player != int(state.actor[row]) and math.inf not in expected:
+                assert float(steps[row, player]) in expected
+                compared += 1
+    assert compared > 150
+
+
+@given(distances=st.lists(st.floats(0, 80), min_size=2, max_size=2), body=st.floats(-180, 180))
+@settings(max_examples=50)
+def test_closer_is_never_later(distances: list[float], body: float) -> None:
+    near, far = sorted(distances)
+    # From 10 m on nobody runs backwards, which makes some far balls come sooner.
+    far = far if far < 10 or near >= 10 else 9.9
+    near = min(near, far)
+    assert one_at(OPPONENT, -near, body=body) <= one_at(OPPONENT, -far, body=body) + 1e-9
+
+
+@given(rates=st.lists(st.floats(0.004, 0.007), min_size=2, max_size=2), distance=st.floats(0, 60))
+@settings(max_examples=50)
+def test_more_power_is_never_later(rates: list[float], distance: float) -> None:
+    weak, strong = sorted(rates)
+    cycles = [one_at(OPPONENT, -distance, types=of_type(dash_power_rate=rate)) for rate in (strong, weak)]
+    assert cycles[0] <= cycles[1] + 1e-9
+
+
+def test_kick_rate_by_the_formula() -> None:
+    ball = torch.tensor([[0.385, 0.0], [1.085, 0.0], [0.0, -0.735], [-1.085, 0.0], [5.0, 0.0]], dtype=torch.float64)
+    got = kick_rate(ball, torch.zeros(5, dtype=torch.float64), TYPE.expand(5, -1))
+    # Touching ahead; at the edge ahead; half a margin away aside; at the edge behind; out of reach as at the edge.
+    assert got.tolist() == pytest.approx([0.027 * part for part in (1, 0.75, 1 - 0.125 - 0.125, 0.5, 0.75)])
+    turned = kick_rate(ball[:1], torch.tensor([math.radians(-90)], dtype=torch.float64), TYPE.expand(1, -1))
+    assert float(turned) == pytest.approx(0.027 * 0.875)
+
+
+@given(gap=st.floats(0, 0.7), step=st.floats(0.01, 0.2), angle=st.floats(0, 170), further=st.floats(1, 10))
+@settings(max_examples=50)
+def test_kicks_are_strongest_near_and_ahead(gap: float, step: float, angle: float, further: float) -> None:
+    def rate(gap: float, degrees: float) -> float:
+        way = (0.385 + gap) * torch.tensor([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
+        return float(kick_rate(way.double(), torch.zeros((), dtype=torch.float64), TYPE))
+
+    assert rate(gap, angle) >= rate(min(gap + step, 0.7), angle) - 1e-9
+    assert rate(gap, angle) > rate(gap, angle + further)
+    assert rate(gap, angle) == pytest.approx(rate(gap, -angle))
+
+
+def test_tackle_failure_by_the_formula() -> None:
+    forward = torch.tensor([1.0, 2.0, 1.0, -0.1, 0.0, 0.5])
+    aside = torch.tensor([0.0, 0.0, -0.625, 0.0, 0.0, 1.25])
+    got = tackle_failure(forward, aside).tolist()
+    assert got[:3] == pytest.approx([1 / 64, 1.0, 2 / 64])
+    # Behind the player and beside him at the width it fails for certain.
+    assert all(value >= 1 for value in got[3:])
+
+
+@given(forward=st.floats(0.01, 3), aside=st.floats(-2, 2), more=st.floats(0, 1))
+@settings(max_examples=50)
+def test_tackles_fail_more_the_further_the_ball(forward: float, aside: float, more: float) -> None:
+    def failure(forward: float, aside: float) -> float:
+        return float(tackle_failure(torch.tensor(forward), torch.tensor(aside)))
+
+    assert failure(forward, aside) <= failure(forward + more, aside)
+    assert failure(forward, aside) <= failure(forward, aside + math.copysign(more, aside))
+
+
+def test_dash_rate_by_the_formula() -> None:
+    directions = torch.tensor([0.0, 45.0, 90.0, 135.0, 180.0])
+    assert dash_rate(directions).tolist() == pytest.approx([1.0, 0.7, 0.4, 0.55, 0.7])

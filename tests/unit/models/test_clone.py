@@ -1,0 +1,331 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+import torch
+from tests.situations import situations
+from torch import Tensor
+
+from teamclone.models.clone import Clone, parameter_count
+from teamclone.models.config import ACTIVATIONS, BLOCKS, ModelConfig
+from teamclone.models.heads.mixture import with_ball
+from teamclone.models.loss import Balance
+from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
+from teamclone.rcss.player_types import FIELDS
+from teamclone.training.config import load_config
+from teamclone.world.channels import CHANNEL
+from teamclone.world.state import State, Target
+
+
+@pytest.fixture(autouse=True)
+def _seeded() -> None:
+    torch.manual_seed(0)
+
+
+def random_state(batch: int) -> State:
+    return State.now(
+        ball=torch.randn(batch, 4),
+        players=torch.randn(batch, 22, len(CHANNEL)) * 20,
+        types=torch.rand(batch, 22, len(FIELDS)) + 0.5,
+        actor=torch.randint(0, 11, (batch,)),
+    )
+
+
+def test_the_papers_architecture() -> None:
+    def layers(*widths: int) -> int:
+        return sum((a + 1) * b for a, b in pairwise(widths))
+
+    heads = 129 * (4 + 6)
+    assert parameter_count(Clone(ModelConfig())) == layers(119, 512, 256, 128) + heads
+    assert parameter_count(Clone(ModelConfig(own_type=True))) == layers(127, 512, 256, 128) + heads
+    assert parameter_count(Clone(ModelConfig(hidden=(32,)))) == layers(119, 32) + 33 * 10
+
+
+def test_answers_are_probabilities_and_bounded_parameters() -> None:
+    model = Clone(ModelConfig())
+    with torch.no_grad():
+        model.head.parameter.weight.mul_(1000)
+    probabilities, parameters = model.predict(random_state(50))
+    assert probabilities.shape == (50, 4)
+    assert probabilities.sum(1).tolist() == pytest.approx([1] * 50)
+    limits = torch.tensor([100.0, 180.0, 180.0, 100.0, 180.0, 180.0])
+    assert parameters.abs().amax(0).tolist() == pytest.approx(limits.tolist())
+
+
+def test_rows_do_not_depend_on_each_other() -> None:
+    model = Clone(ModelConfig())
+    state = random_state(17)
+    whole = model.predict(state)
+    for row in (0, 16):
+        alone = model.predict(State(*(tensor[row : row + 1] for tensor in state)))
+        for one, all_ in zip(alone, whole, strict=True):
+            assert torch.allclose(one[0], all_[row], atol=1e-2, rtol=1e-3)
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_every_activation_changes_the_answer(activation: str) -> None:
+    state = random_state(4)
+    answers = []
+    for name in ("relu", activation):
+        torch.manual_seed(0)
+        answers.append(Clone(ModelConfig(activation=name)).predict(state)[0])
+    assert torch.equal(*answers) == (activation == "relu")
+
+
+def test_overfits_sixty_four_samples() -> None:
+    model = Clone(ModelConfig())
+    state = random_state(64)
+    kind = torch.randint(0, 4, (64,))
+    limits = torch.tensor([[100.0, 180.0], [180.0, 0.0], [100.0, 180.0], [180.0, 0.0]])
+    target = Target(kind=kind, parameters=(torch.rand(64, 2) * 1.6 - 0.8) * limits[kind])
+    model.inputs.fit([model.inputs.project(state)])
+    optimiser = torch.optim.Adam(model.parameters(), lr=1e-3)
+    for _ in range(200):
+        loss = model.head.loss(model.output(state), target)
+        optimiser.zero_grad()
+        loss.total.backward()
+        optimiser.step()
+    prediction = model(state)
+    assert torch.equal(prediction.logits.argmax(1), kind)
+    assert loss.parameters.item() < 1e-3
+
+
+RELATIVE = ModelConfig(
+    features="relative",
+    blocks=("self", "role", "type", "ball", "reach", "lines"),
+    kick_blocks=("self", "last", "ball", "mates", "opponents"),
+    aims=4,
+    aim_hidden=(32,),
+    parameter_hidden=(64,),
+    kick_hidden=(64,),
+    hidden=(128, 64),
+    head="mixture",
+)
+SMALL = replace(RELATIVE, hidden=(16,), parameter_hidden=(16,), kick_hidden=(16,), aim_hidden=(8,))
+MODELS = {
+    "mixture": SMALL,
+    "no aims": replace(SMALL, aims=0, aim_hidden=()),
+    "one aim": replace(SMALL, aims=1),
+    "no kick blocks": replace(SMALL, kick_blocks=()),
+    "no role": replace(SMALL, blocks=("ball",)),
+    "point": replace(SMALL, head="point", kick_blocks=(), kick_hidden=(), parameter_hidden=()),
+    "past": replace(SMALL, blocks=("self", "past")),
+    "attention": replace(SMALL, kick_attention=8),
+    "plan": replace(SMALL, kick_attention=8, kick_blocks=("ball", "plan")),
+    "all": replace(SMALL, blocks=BLOCKS, kick_blocks=BLOCKS, kick_attention=4, dropout=0.2, kick_dropout=0.2),
+}
+
+
+@pytest.mark.parametrize("config", MODELS.values(), ids=MODELS)
+def test_relative_models_answer_alike_alone_and_in_batches(config: ModelConfig) -> None:
+    model = Clone(config).eval()
+    state = situations(17, history=model.inputs.history)
+    model.inputs.fit([model.inputs.project(state)])
+    probabilities, parameters = model.predict(state)
+    assert probabilities.sum(1).tolist() == pytest.approx([1] * 17)
+    assert parameters.isfinite().all()
+    limits = torch.tensor([100.0, 180.0, 180.0, 100.0, 180.0, 180.0])
+    assert (parameters.abs() <= limits + 1e-3).all()
+    if config.head == "mixture":
+        assert (parameters[:, [0, 3]] >= 0).all()
+    for rows in (slice(0, 1), slice(16, 17), slice(4, 7)):
+        part = model.predict(State(*(tensor[rows] for tensor in state)))
+        for one, whole in zip(part, (probabilities, parameters), strict=True):
+            assert torch.allclose(one, whole[rows], atol=1e-2, rtol=1e-3)
+
+
+def test_kicks_are_decided_on_their_own_blocks() -> None:
+    model = Clone(SMALL)
+    state = situations(20)
+    model.inputs.fit([model.inputs.project(state)])
+    other = state._replace(players=state.players.clone())
+    # What he did last is among the blocks of a kick only, whom he can see among none.
+    other.players[..., CHANNEL["last_command"]] = (state.players[..., CHANNEL["last_command"]] + 1) % 5
+    other.players[..., CHANNEL["neck"]] += 20
+    (logits, before), (other_logits, after) = model(state), model(other)
+    assert torch.equal(logits, other_logits)
+    assert torch.equal(before[:, :3], after[:, :3])
+    assert not torch.equal(before[:, 3:5], after[:, 3:5])
+    for one, two in zip(model.output(state).kick, model.output(other).kick, strict=True):
+        assert not torch.equal(one.tackle, two.tackle)
+
+
+def kick_logits(model: Clone, state: State) -> Tensor:
+    logits: Tensor = model.output(state).kick[0].power.logits
+    return logits
+
+
+def test_dropout_is_for_training_only() -> None:
+    state = situations(5)
+    plain, kicks = Clone(replace(SMALL, dropout=0.5)), Clone(replace(SMALL, kick_dropout=0.5))
+    for model, of_command, of_kick in ((plain, True, False), (kicks, False, True)):
+        assert torch.equal(model(state).logits, model(state).logits) != of_command
+        assert torch.equal(kick_logits(model, state), kick_logits(model, state)) != of_kick
+        model.eval()
+        assert torch.equal(model(state).logits, model(state).logits)
+        assert torch.equal(kick_logits(model, state), kick_logits(model, state))
+
+
+def likely_target(state: State) -> Target:
+    """Commands as agents of the league give them: powers at their bound, clipped turns, directions in steps."""
+    n = len(state.ball)
+    kind = torch.arange(n) % 4
+    power = torch.where(torch.rand(n) < 0.5, 100.0, torch.rand(n) * 99)
+    moment = (torch.rand(n) * 400 - 200).clamp(-180, 180)
+    direction = torch.rand(n) * 360 - 180
+    first = torch.stack([power, moment, power, (direction / 9).round() * 9], 1)
+    second = torch.stack([(direction / 15).round() * 15, torch.zeros(n), direction, torch.zeros(n)], 1)
+    both = torch.stack([first, second], 2)
+    return Target(kind, both[torch.arange(n), kind])
+
+
+def test_a_mixture_overfits_sixty_four_samples() -> None:
+    model = Clone(RELATIVE)
+    state = situations(64)
+    target = likely_target(state)
+    model.inputs.fit([model.inputs.project(state)])
+    inputs = model.features(state)
+    optimiser = torch.optim.Adam(model.parameters(), lr=5e-3)
+    likelihoods = []
+    for _ in range(120):
+        loss = model.head.loss(model.answer(inputs), target)
+        optimiser.zero_grad()
+        loss.total.backward()
+        optimiser.step()
+        likelihoods.append(-loss.parameters.item())
+    assert likelihoods[-1] > likelihoods[0] + 4
+    with torch.no_grad():
+        prediction = model(state)
+    assert torch.equal(prediction.logits.argmax(1), target.kind)
+    away = []
+    for parameter, values in zip(PARAMETERS, prediction.parameters.T, strict=True):
+        rows = target.kind == CLONED_KINDS.index(parameter.kind)
+        error = values[rows] - target.parameters[rows, parameter.argument]
+        error = torch.remainder(error + 180, 360) - 180 if parameter.angle else error
+        away.append(float(error.abs().median()))
+    # Directions of dashes and tackles are classes; the others come near.
+    assert away == pytest.approx([0, 0, 0, 0, 0, 0], abs=5)
+    assert (away[1], away[5]) == pytest.approx((0, 0), abs=1e-3)
+
+
+def test_every_weight_of_the_mixture_learns() -> None:
+    model = Clone(RELATIVE)
+    state = situations(64)
+    model.inputs.fit([model.inputs.project(state)])
+    model.head.loss(model.output(state), likely_target(state)).total.backward()
+    for name, weights in model.named_parameters():
+        assert weights.grad is not None, name
+        assert weights.grad.isfinite().all(), name
+        assert weights.grad.abs().max() > 0, name
+
+
+def taught(loss: Tensor, model: Clone) -> set[str]:
+    """Which parts of a model, two levels deep, the gradient of an error reaches."""
+    names, weights = zip(*model.named_parameters(), strict=True)
+    gradients = torch.autograd.grad(loss, weights, allow_unused=True, retain_graph=True)
+    reached = [name for name, gradient in zip(names, gradients, strict=True) if gradient is not None and gradient.any()]
+    return {".".join(name.split(".")[:2]) for name in reached}
+
+
+def test_parameters_teach_neither_the_layers_of_the_command_nor_the_aims() -> None:
+    model = Clone(RELATIVE)
+    state = situations(64)
+    target = likely_target(state)
+    model.inputs.fit([model.inputs.project(state)])
+    output = model.output(state)
+    by_kind = {
+        CommandKind.DASH: {"trunk.parameters_of", "head.dash", "head.incomes", "head.powers"},
+        CommandKind.TURN: {"trunk.parameters_of", "head.turn"},
+        CommandKind.KICK: {"trunk.kick", "head.kick"},
+        CommandKind.TACKLE: {"trunk.kick", "head.tackle"},
+    }
+    likelihood = model.head.log_likelihood(output, target)
+    for index, kind in enumerate(CLONED_KINDS):
+        assert taught(likelihood[target.kind == index].sum(), model) == by_kind[kind]
+    loss = model.head.loss(output, target, weight=1.0)
+    assert taught(loss.parameters, model) == set.union(*by_kind.values())
+    assert taught(loss.cross_entropy, model) == {"trunk.aims", "trunk.command", "head.command"}
+
+
+def test_turns_teach_the_aims_and_nothing_else_through_their_own_bell() -> None:
+    model = Clone(RELATIVE)
+    state = situations(64)
+    target = likely_target(state)
+    model.inputs.fit([model.inputs.project(state)])
+    output = model.output(state)
+    plain, aimed = (model.head.loss(output, target, aim_weight=weight) for weight in (0.0, 0.5))
+    assert aimed.parameters == plain.parameters
+    assert aimed.total > plain.total
+    nothing_else = Balance(weight=torch.zeros(4), shift=torch.zeros(4))
+    alone = model.head.loss(output, target, weight=0.0, aim_weight=0.5, balance=nothing_else)
+    assert alone.total.item() == pytest.approx((aimed.total - plain.total).item(), rel=1e-4)
+    assert taught(alone.total, model) == {"trunk.aims"}
+    turns = target.kind == CLONED_KINDS.index(CommandKind.TURN)
+    without = Target(target.kind[~turns], target.parameters[~turns])
+    others = model.output(State(*(tensor[~turns] for tensor in state)))
+    assert model.head.loss(others, without, aim_weight=0.5).total == model.head.loss(others, without).total
+
+
+@pytest.mark.parametrize("config", [SMALL, replace(SMALL, members=2), MODELS["plan"]], ids=("one", "two", "plan"))
+def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> None:
+    """What is asked for is the same, and the rest of the answer, too."""
+    model = Clone(config).eval()
+    state = situations(40)
+    target = likely_target(state)
+    model.inputs.fit([model.inputs.project(state)])
+    inputs = model.features(state)
+    rows = with_ball(target)
+    assert rows.tolist() == [row for row in range(40) if row % 4 >= 2]
+    with torch.no_grad():
+        whole, asked = model.answer(inputs), model.answer(inputs, kicks=rows)
+        likelihoods = [model.head.log_likelihood(output, target) for output in (whole, asked)]
+        losses = [torch.stack(model.head.loss(output, target, aim_weight=0.3)) for output in (whole, asked)]
+        points = [model.head.point(output) for output in (whole, asked)]
+    torch.testing.assert_close(*likelihoods, atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(*losses, atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(points[0].logits, points[1].logits)
+    torch.testing.assert_close(points[0].parameters[rows], points[1].parameters[rows], atol=1e-2, rtol=1e-3)
+    others = [row for row in range(40) if row % 4 < 2]
+    torch.testing.assert_close(points[0].parameters[others, :3], points[1].parameters[others, :3])
+    assert (points[0].parameters[others, 3:] != 0).any()
+    assert (points[1].parameters[others, 3:] == 0).all()
+
+
+@pytest.mark.parametrize("config", [SMALL, MODELS["plan"]], ids=("free", "plan"))
+def test_a_batch_without_kicks_learns(config: ModelConfig) -> None:
+    model = Clone(config)
+    state = situations(12)
+    target = likely_target(state)._replace(kind=torch.arange(12) % 2)
+    model.inputs.fit([model.inputs.project(state)])
+    loss = model.head.loss(model.answer(model.features(state), kicks=with_ball(target)), target)
+    whole = model.head.loss(model.output(state), target)
+    assert loss.total.item() == pytest.approx(whole.total.item(), rel=1e-4)
+    loss.total.backward()
+    for name, weights in model.named_parameters():
+        assert weights.grad is not None, name
+        assert weights.grad.isfinite().all(), name
+
+
+class Exported(torch.nn.Module):
+    """From the tensors of a state to the single best answer."""
+
+    def __init__(self, model: Clone) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> tuple[Tensor, Tensor]:
+        logits, parameters = self.model(State.now(ball=ball, players=players, types=types, actor=actor))
+        return logits, parameters
+
+
+def test_the_preset_best_can_be_exported_for_any_batch() -> None:
+    model = Exported(Clone(load_config("best").model).eval())
+    batch = torch.export.Dim("batch", min=1)
+    exported = torch.export.export(model, situations(3)[:4], dynamic_shapes=({0: batch},) * 4).module()
+    for n in (1, 3, 17):
+        state = situations(n, seed=n)
+        for one, other in zip(exported(*state[:4]), model(*state[:4]), strict=True):
+            assert one.shape[0] == n
+            assert torch.allclose(one, other, atol=1e-2)

@@ -54,7 +54,7 @@ def cycles_over(distance: Value, speed: Value, decay: Value, *, least: float = 0
     left = 1.0 - distance * (1.0 - decay) / speed
     xp = _of(left)
     if least:
-        left = xp.clip(left, min=least)
+        left = xp.clip(left, least, None)
     return xp.log(left) / (math.log(decay) if isinstance(decay, float) else _of(decay).log(decay))
 
 
@@ -208,7 +208,7 @@ def rested(
     effort = xp.where(rises, xp.minimum(effort + server["effort_inc"], _like(effort, effort_max)), effort)
     gain = xp.minimum(recovery * stamina_inc_max, most - stamina)
     limited_gain = xp.where(_like(gain, server["stamina_capacity"]) >= 0, xp.minimum(gain, capacity), gain)
-    return stamina + limited_gain, effort, recovery, xp.clip(capacity - limited_gain, min=0.0)
+    return stamina + limited_gain, effort, recovery, xp.clip(capacity - limited_gain, 0.0, None)
 
 
 def _like(values: Value, number: Value) -> Value:

@@ -32,6 +32,7 @@ from typing import Any
 import fidelity_page
 import numpy as np
 import torch
+from kicks import kicked
 from measure import cost_of
 from numpy.typing import NDArray
 
@@ -45,8 +46,8 @@ from teamclone.evaluation.evaluate import count_training, describe, predict, tru
 from teamclone.evaluation.outcome import Outcome
 from teamclone.models.clone import parameter_count
 from teamclone.models.config import BLOCKS
-from teamclone.models.inputs.egocentric import RelativeFeatures
-from teamclone.models.inputs.reach import kickable_area, kicked, reach_ball
+from teamclone.models.inputs.egocentric import EgocentricFeatures
+from teamclone.models.inputs.reach import kickable_area, reach_ball
 from teamclone.planner.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.system.files import write_json
@@ -285,9 +286,9 @@ class Work:
         return found
 
     @cached_property
-    def columns(self) -> tuple[RelativeFeatures, torch.Tensor]:
+    def columns(self) -> tuple[EgocentricFeatures, torch.Tensor]:
         """All blocks of inputs of ``rows``, (n, columns): they cost more than a network's answers, so once for all."""
-        features = RelativeFeatures(BLOCKS, others=True)
+        features = EgocentricFeatures(BLOCKS, others=True)
         made = torch.empty(len(self.rows), len(features.names))
         start = 0
         for part in chunks(self.rows):
@@ -295,7 +296,7 @@ class Work:
             start += len(part)
         return features, made
 
-    def inputs_of(self, features: RelativeFeatures) -> torch.Tensor:
+    def inputs_of(self, features: EgocentricFeatures) -> torch.Tensor:
         """(n, columns) what features of some blocks project of ``rows``."""
         everything, made = self.columns
         place = {name: index for index, name in enumerate(everything.names)}
@@ -409,7 +410,7 @@ class Work:
             write_json(ended, {"seconds": before + cost.wall, "peak_bytes": cost.peak})
         run = open_run(folder)
         model = run.load_model()
-        inputs = self.inputs_of(model.features) if isinstance(model.features, RelativeFeatures) else None
+        inputs = self.inputs_of(model.features) if isinstance(model.features, EgocentricFeatures) else None
         outcome = predict(model, self.dataset, self.rows, inputs=inputs)
         if experiment.step == "c":
             np.savez(self.out / "answers" / f"{experiment.name}.npz", probabilities=outcome.probabilities)
@@ -457,7 +458,7 @@ class Work:
         """Gradient-boosted trees on all blocks of relative inputs, stopped by the validation matches."""
         from sklearn.ensemble import HistGradientBoostingClassifier
 
-        features = RelativeFeatures()
+        features = EgocentricFeatures()
 
         def columns(index: NDArray[np.int64]) -> NDArray[np.float32]:
             parts = [self._columns(features, part) for part in chunks(index)]
@@ -490,7 +491,7 @@ class Work:
             "sets": self.figures(outcome),
         }
 
-    def _columns(self, features: RelativeFeatures, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+    def _columns(self, features: EgocentricFeatures, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         state = self.dataset.state(rows, history=features.history)
         found: NDArray[np.float32] = features.project(state)[:, : features.n_inputs].numpy()
         return found
@@ -600,10 +601,9 @@ class Work:
             state, target = self.dataset.state(part), self.dataset.target(part)
             made = plans(state)
             able = torch.nonzero(made[:, 0] > 0).squeeze(1)
-            me, types = (of[able, state.actor[able]] for of in (state.players, state.types))
             rows.append(part[able.numpy()])
             planned.append(made[able].numpy())
-            given.append(kicked(state.ball[able], me, types, target.parameters[able]).numpy())
+            given.append(kicked(state.select(able), target.parameters[able]).numpy())
         return np.concatenate(rows), np.concatenate(planned), np.concatenate(given)
 
     def _kicks_of_clone(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -611,11 +611,8 @@ class Work:
         model = open_run(self.out / "runs" / "best-0").load_model().eval()
         state = self.dataset.state(rows, history=model.inputs.history)
         outcome = predict(model, self.dataset, rows)
-        me, types = (of[torch.arange(len(rows)), state.actor] for of in (state.players, state.types))
         place = [PARAMETERS.index(item) for item in PARAMETERS if item.kind.name == "KICK"]
-        found: NDArray[np.float32] = kicked(
-            state.ball, me, types, torch.from_numpy(outcome.parameters[:, place])
-        ).numpy()
+        found: NDArray[np.float32] = kicked(state, torch.from_numpy(outcome.parameters[:, place])).numpy()
         return found
 
 
@@ -655,9 +652,9 @@ def situations(state: State) -> NDArray[np.int64]:
     """(batch,) index into SITUATIONS of the acting player; the ball is taken to roll on freely."""
     actor = state.actor[:, None]
     gap = (state.players[..., [CHANNEL["x"], CHANNEL["y"]]] - state.ball[:, None, :2]).norm(dim=2)
-    kickable = (gap <= kickable_area(state.types)).gather(1, actor)[:, 0]
+    kickable = (gap <= kickable_area(state.types, state.server))[state.frame, state.actor]
     free = torch.zeros(len(state.actor), dtype=torch.bool)
-    steps = reach_ball(state.ball, state.players, state.types, held=free, actor=state.actor).steps[:, :11]
+    steps = reach_ball(state, held=free).steps[:, :11]
     first = steps.gather(1, actor)[:, 0] <= steps.amin(1)
     found: NDArray[np.int64] = torch.where(kickable, 0, torch.where(first, 1, 2)).numpy()
     return found

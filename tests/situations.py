@@ -63,17 +63,14 @@ def situations(n: int, *, seed: int = 0, history: int = 0, dtype: torch.dtype = 
     past_players[..., CHANNEL["stamina"]] -= 10 * back[:, None]
     known = torch.ones(n, history, dtype=torch.bool)
     known[:1] = False
-    return State(
+    return State.now(
         ball=ball,
         players=players,
         types=types,
         actor=actor,
-        past_ball=past_ball,
-        past_players=past_players,
-        past_known=known,
         mode=torch.randint(len(PlayMode), (n,), generator=generator),
         mode_cycles=torch.randint(120, (n,), generator=generator).to(dtype),
-    )
+    )._replace(past_ball=past_ball, past_players=past_players, past_known=known)
 
 
 def resting(n: int = 1, *, history: int = 0, dtype: torch.dtype = torch.float32) -> State:
@@ -84,16 +81,12 @@ def resting(n: int = 1, *, history: int = 0, dtype: torch.dtype = torch.float32)
     for name, value in (("stamina", 8000.0), ("effort", 1.0), ("recovery", 1.0), ("capacity", 130600.0)):
         players[..., CHANNEL[name]] = value
     players[:, 0, CHANNEL["flags"]] = FLAG_ON_FIELD
-    return State(
-        ball=torch.zeros(n, 4, dtype=dtype),
-        players=players,
-        types=types,
-        actor=torch.zeros(n, dtype=torch.int64),
+    return State.now(
+        ball=torch.zeros(n, 4, dtype=dtype), players=players, types=types, actor=torch.zeros(n, dtype=torch.int64)
+    )._replace(
         past_ball=torch.zeros(n, history, 4, dtype=dtype),
         past_players=players[:, None].repeat(1, history, 1, 1),
         past_known=torch.zeros(n, history, dtype=torch.bool),
-        mode=torch.full((n,), PlayMode.PLAY_ON),
-        mode_cycles=torch.zeros(n, dtype=dtype),
     )
 
 

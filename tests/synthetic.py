@@ -68,6 +68,7 @@ def make_dataset(
         "match": match,
         "cycle": np.tile(np.arange(1, frames_per_match + 1), len(splits)),
         "playmode": np.full(n, 3),
+        "mode_cycles": np.zeros(n),
         "score": np.zeros((n, 2)),
         "ball": ball,
         "position": position,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,13 @@ from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.errors import DatasetError, UsageError
+from teamclone.rcss import server_params
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
 from teamclone.store import Store
 from teamclone.store.shared import SharedStore
 from teamclone.system.workers import Died, run_tasks
+from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS
 
 AHEAD = 64
 """Cleaned matches that a cluster may hold ready: more than one writer takes from it in a second, in 300 MB."""
@@ -126,7 +128,7 @@ def build_dataset(
     replace: bool = False,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Builds a dataset and writes it to ``out``, the same bytes wherever its matches are cleaned.
+    """Build a dataset and write it to ``out``, the same bytes wherever its matches are cleaned.
 
     Args:
         executor: where matches are cleaned, for example on a cluster (``cluster.executor_of``); its workers must see
@@ -156,20 +158,9 @@ def build_dataset(
         validation=config.validation,
         seed=config.seed,
     )
-    shared = SharedStore.of(store)
-    tasks = [
-        _Task(
-            store=shared,
-            entry=entry,
-            commands=config.commands,
-            turn_zero=config.turn_zero,
-            goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
-            repertoire=config.repertoire,
-        )
-        for entry in entries
-    ]
+    tasks = _tasks(entries, config, splits, SharedStore.of(store))
     matches: list[dict[str, Any]] = []
-    types: list[NDArray[np.float32]] = []
+    parameters: list[_Parameters] = []
     rows = np.zeros((len(layout.Split), len(config.repertoire)), np.int64)
     with writing_dataset(out, replace=replace) as writer:
         for task, cleaned in run_tasks(_clean, tasks, executor=executor, jobs=jobs, ahead=AHEAD, in_order=True):
@@ -178,37 +169,71 @@ def build_dataset(
                     f"{task.entry.name}: the process that cleaned it was killed, perhaps out of memory; "
                     "try again with --jobs 1"
                 )
-            match, types_of_match = cleaned
-            split, kind = splits[task.entry.match_id], match.samples["kind"]
-            if config.split is SplitBy.ROWS and split is not layout.Split.UNSEEN:
-                of_rows, name = split_rows(len(kind), match_id=task.entry.match_id, seed=config.seed), "rows"
-            else:
-                of_rows, name = np.full(len(kind), split, np.uint8), split.name.lower()
+            match, of_match = cleaned
+            of_rows, name = _split_of_rows(match, task.entry, splits[task.entry.match_id], config)
             _add(writer, match, index=len(matches), split=of_rows)
-            np.add.at(rows, (of_rows, kind), 1)
+            np.add.at(rows, (of_rows, match.samples["kind"]), 1)
             row = _report_match(task.entry, match, split=name, repertoire=config.repertoire)
             matches.append(row if len(config.teams) == 1 else {"team": task.entry.team, **row})
-            types.append(types_of_match)
+            parameters.append(of_match)
             if on_progress is not None:
                 on_progress(len(matches), len(entries))
         report = _report(config, matches, rows=rows, without_team=without_team)
         if not writer.n_samples:
-            left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
-            raise DatasetError(
-                f"{out}: no command of {config.team} is left after cleaning ({left}). "
-                "Matches without a command log have none to give, and before log version 3 nothing tells what was "
-                "executed"
-            )
-        meta = {
-            "team": config.team,
-            **({"teams": config.teams} if len(config.teams) > 1 else {}),
-            **({"commands": config.repertoire} if config.repertoire != CLONED else {}),
-            "options": _options(config),
-            "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
-            "cleaning": report,
-        }
-        writer.finish(player_types=_pad_types(types), meta=meta)
+            raise _nothing_left(out, config, report)
+        writer.finish(
+            player_types=_pad_types([each.types for each in parameters]),
+            server_params=np.stack([each.server for each in parameters]),
+            meta=_meta(config, matches, report),
+        )
     return report
+
+
+def _tasks(
+    entries: Sequence[_Entry], config: DatasetConfig, splits: Mapping[str, layout.Split], store: SharedStore
+) -> list[_Task]:
+    return [
+        _Task(
+            store=store,
+            entry=entry,
+            commands=config.commands,
+            turn_zero=config.turn_zero,
+            goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
+            repertoire=config.repertoire,
+        )
+        for entry in entries
+    ]
+
+
+def _split_of_rows(
+    match: MatchSamples, entry: _Entry, split: layout.Split, config: DatasetConfig
+) -> tuple[NDArray[np.uint8], str]:
+    """Return the split of each sample of a match, (n_samples,), and the name under which the report has the match."""
+    n = len(match.samples["kind"])
+    if config.split is SplitBy.ROWS and split is not layout.Split.UNSEEN:
+        return split_rows(n, match_id=entry.match_id, seed=config.seed), "rows"
+    return np.full(n, split, np.uint8), split.name.lower()
+
+
+def _nothing_left(out: Path, config: DatasetConfig, report: dict[str, Any]) -> DatasetError:
+    left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
+    return DatasetError(
+        f"{out}: no command of {config.team} is left after cleaning ({left}). "
+        "Matches without a command log have none to give, and before log version 3 nothing tells what was "
+        "executed"
+    )
+
+
+def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict[str, Any]) -> dict[str, Any]:
+    """Return what ``dataset.json`` says beside counts."""
+    return {
+        "team": config.team,
+        **({"teams": config.teams} if len(config.teams) > 1 else {}),
+        **({"commands": config.repertoire} if config.repertoire != CLONED else {}),
+        "options": _options(config),
+        "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
+        "cleaning": report,
+    }
 
 
 def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
@@ -235,14 +260,22 @@ def _options(config: DatasetConfig) -> dict[str, Any]:
     return {"team": teams if len(teams) > 1 else config.team, **options}
 
 
-def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:
-    """Runs in a worker: the samples of one match and its player types, (n_types, n_fields)."""
+class _Parameters(NamedTuple):
+    """Parameters of one match: ``types`` (n_types, n_fields) of its players, ``server`` (n_fields,)."""
+
+    types: NDArray[np.float32]
+    server: NDArray[np.float64]
+
+
+def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
+    """Return the samples of one match and its parameters. Runs in a worker."""
     store, match_id = task.store.open(), task.entry.match_id
+    params = store.read_parameters(match_id)["server"]
     samples = clean.clean_match(
-        store.read_match_columns(match_id, "frames", columns=clean.FRAME_COLUMNS),
-        store.read_match_columns(match_id, "player_states", columns=clean.PLAYER_COLUMNS),
+        store.read_match_columns(match_id, "frames", columns=FRAME_COLUMNS),
+        store.read_match_columns(match_id, "player_states", columns=PLAYER_COLUMNS),
         store.read_match_columns(match_id, "commands", columns=clean.COMMAND_COLUMNS),
-        store.read_parameters(match_id)["server"],
+        params,
         side=task.entry.side,
         keep=task.commands,
         turn_zero=task.turn_zero,
@@ -250,7 +283,10 @@ def _clean(task: _Task) -> tuple[MatchSamples, NDArray[np.float32]]:
         repertoire=task.repertoire,
     )
     types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
-    return samples, np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32)
+    return samples, _Parameters(
+        types=np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32),
+        server=server_params.vector(params, version=server_params.OLDEST),
+    )
 
 
 def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:

@@ -5,6 +5,7 @@
     DS/frames/<name>.npy      FRAME_ARRAYS, shape (n_frames, ...), matches in order
     DS/samples/<name>.npy     SAMPLE_ARRAYS, shape (n_samples, ...), ordered by frame, then player
     DS/player_types.npy       (n_matches, n_types, n_fields) float32, fields as `player_types.FIELDS`
+    DS/server_params.npy      (n_matches, n_fields) float64, fields as `server_params.FIELDS`
 
 The modelled team attacks +x and holds the places 0..10 of the player axis (its numbers 1..11), its opponent 11..21.
 """
@@ -63,6 +64,7 @@ FRAME_ARRAYS = (
     Array(name="match", dtype="int32", shape=(), about="index into the dataset's list of matches"),
     Array(name="cycle", dtype="int32", shape=(), about="server time of the frame"),
     Array(name="playmode", dtype="uint8", shape=(), about="play mode id as logged, from the left team's point of view"),
+    Array(name="mode_cycles", dtype="int32", shape=(), about="frames since the play mode began, 0 in its first"),
     Array(name="score", dtype="int8", shape=(2,), about="goals of the modelled team and of its opponent"),
     Array(name="ball", dtype="float32", shape=(4,), about="x, y in m, vx, vy in m/cycle"),
     Array(name="position", dtype="float32", shape=(22, 2), about="x, y of every player in m"),

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,10 @@ from teamclone.dataset.layout import (
 from teamclone.errors import DatasetError
 from teamclone.rcss.commands import CLONED, CommandKind, not_of_repertoire
 from teamclone.rcss.player_types import FIELDS
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import OTHER_SIDE
-from teamclone.world.channels import PLAYER_CHANNELS
+from teamclone.rcss.server_params import SERVER_FIELD
+from teamclone.world.channels import CHANNEL
 from teamclone.world.state import State, Target
 
 Rows = NDArray[np.int64] | Tensor
@@ -45,7 +47,7 @@ def _steps(device: torch.device) -> Tensor:
     return torch.from_numpy(STEPS).to(device)
 
 
-@dataclass(frozen=True, kw_only=True)  # without slots: `_modes` is kept
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Dataset:
     """A dataset that has been opened. Its arrays stay on disk; every method reads just the rows it is asked for.
 
@@ -54,7 +56,8 @@ class Dataset:
         meta: ``dataset.json``.
         frames: FRAME_ARRAYS by name, (n_frames, ...).
         samples: SAMPLE_ARRAYS by name, (n_samples, ...).
-        player_types: (n_matches, n_types, len(FIELDS)) float32.
+        player_types: (n_matches, n_types, len(player_types.FIELDS)) float32.
+        server_params: (n_matches, len(server_params.FIELDS)) float64.
     """
 
     path: Path
@@ -62,6 +65,7 @@ class Dataset:
     frames: dict[str, Tensor]
     samples: dict[str, Tensor]
     player_types: Tensor
+    server_params: Tensor
 
     def __len__(self) -> int:
         return len(self.samples["frame"])
@@ -84,7 +88,10 @@ class Dataset:
     @property
     def nbytes(self) -> int:
         """Size of all arrays."""
-        return sum(array.nbytes for array in (*self.frames.values(), *self.samples.values(), self.player_types))
+        return sum(
+            array.nbytes
+            for array in (*self.frames.values(), *self.samples.values(), self.player_types, self.server_params)
+        )
 
     def to(self, device: torch.device) -> Dataset:
         """The same with all arrays in the memory of a device, where ``rows`` have to lie and answers will."""
@@ -93,6 +100,7 @@ class Dataset:
             frames={name: array.to(device) for name, array in self.frames.items()},
             samples={name: array.to(device) for name, array in self.samples.items()},
             player_types=self.player_types.to(device),
+            server_params=self.server_params.to(device),
         )
 
     def split(self, split: Split) -> NDArray[np.int64]:
@@ -100,7 +108,7 @@ class Dataset:
         return np.flatnonzero(self.samples["split"].numpy() == int(split))
 
     def need(self, channels: Sequence[str], rows: NDArray[np.int64]) -> None:
-        """See that the frames of these samples hold the ball and these of PLAYER_CHANNELS: not every log has all.
+        """See that the frames of these samples hold the ball and these of CHANNEL: not every log has all.
 
         Raises:
             DatasetError: a match lacks one.
@@ -130,18 +138,18 @@ class Dataset:
                     )
 
     def state(self, rows: Rows, *, history: int = 0) -> State:
-        """The situations in which the commands of these samples were decided, in the order asked for.
+        """Return the situations in which the commands of these samples were decided, in the order asked for.
 
         Args:
             history: how many frames before each to give too.
         """
         rows = torch.as_tensor(rows)
-        frame = self.samples["frame"].index_select(0, rows).long()
+        frame, place = torch.unique(self.samples["frame"].index_select(0, rows).long(), return_inverse=True)
+        match = self.frames["match"].index_select(0, frame).long()
         players = self._players(frame)
         n_types = self.player_types.shape[1]
-        kinds = players[..., PLAYER_CHANNELS.index("type")].long()
-        place = self.frames["match"].index_select(0, frame)[:, None] * n_types + kinds
-        types = self.player_types.reshape(-1, len(FIELDS)).index_select(0, place.reshape(-1))
+        kinds = match[:, None] * n_types + players[..., CHANNEL["type"]].long()
+        types = self.player_types.reshape(-1, len(FIELDS)).index_select(0, kinds.reshape(-1))
         back = torch.arange(1, history + 1, device=rows.device)
         past = (frame[:, None] - back).clamp(min=0)
         known = torch.ones_like(past, dtype=torch.bool)
@@ -152,31 +160,28 @@ class Dataset:
         return State(
             ball=self.frames["ball"].index_select(0, frame),
             players=players,
-            types=types.reshape(len(rows), 22, len(FIELDS)),
-            actor=self.samples["player"].index_select(0, rows).long(),
-            past_ball=self.frames["ball"].index_select(0, past).reshape(len(rows), history, 4),
-            past_players=self._players(past).reshape(len(rows), history, 22, len(PLAYER_CHANNELS)),
+            types=types.reshape(len(frame), N_PLAYERS, len(FIELDS)),
+            server=self.server_params.index_select(0, match).to(torch.float32),
+            past_ball=self.frames["ball"].index_select(0, past).reshape(len(frame), history, 4),
+            past_players=self._players(past).reshape(len(frame), history, N_PLAYERS, len(CHANNEL)),
             past_known=known,
-            mode=self._modes[0].index_select(0, frame).long(),
-            mode_cycles=self._modes[1].index_select(0, frame),
+            mode=self._mode(frame),
+            mode_cycles=self.frames["mode_cycles"].index_select(0, frame).to(torch.float32),
+            frame=place,
+            actor=self.samples["player"].index_select(0, rows).long(),
         )
 
-    @cached_property
-    def _modes(self) -> tuple[Tensor, Tensor]:
-        """Of every frame the play mode as of `State`, and the frames since it began."""
-        match, mode, cycle = (self.frames[name].long() for name in ("match", "playmode", "cycle"))
-        turned = torch.tensor([of.get("side") == "right" for of in self.matches], device=match.device)[match]
-        other_side = torch.from_numpy(OTHER_SIDE).to(match.device).long()
-        began = torch.ones_like(match, dtype=torch.bool)
-        began[1:] = (match[1:] != match[:-1]) | (mode[1:] != mode[:-1]) | (cycle[1:] > cycle[:-1] + 1)
-        place = torch.arange(len(match), device=match.device)
-        since = place - torch.where(began, place, 0).cummax(0).values
-        return torch.where(turned, other_side[mode], mode).to(torch.uint8), since.to(torch.float32)
+    def _mode(self, frame: Tensor) -> Tensor:
+        """Return (frames,) int64 the play mode of some frames as the modelled team sees it."""
+        turned = torch.tensor([match.get("side") == "right" for match in self.matches], device=frame.device)
+        mode = self.frames["playmode"].index_select(0, frame).long()
+        other = torch.from_numpy(OTHER_SIDE).to(frame.device).long()[mode]
+        return torch.where(turned[self.frames["match"].index_select(0, frame).long()], other, mode)
 
     def _players(self, frame: Tensor) -> Tensor:
-        """(frames, 22, len(PLAYER_CHANNELS)) of some frames."""
+        """(frames, 22, len(CHANNEL)) of some frames."""
         stored, codes = (self.frames[name].index_select(0, frame) for name in ("measured", "categorical"))
-        players = torch.empty(len(frame), 22, len(PLAYER_CHANNELS), device=frame.device)
+        players = torch.empty(len(frame), N_PLAYERS, len(CHANNEL), device=frame.device)
         players[..., :2] = self.frames["position"].index_select(0, frame)
         measured, categorical = players[..., 2 : 2 + len(MEASURED_INDEX)], players[..., 2 + len(MEASURED_INDEX) :]
         torch.mul(stored, _steps(frame.device), out=measured)
@@ -206,8 +211,7 @@ class Dataset:
 
     def mode(self, rows: Rows) -> Tensor:
         """(batch,) int64: the play mode of each sample as of `State`."""
-        frame = self.samples["frame"].index_select(0, torch.as_tensor(rows))
-        return self._modes[0].index_select(0, frame).long()
+        return self._mode(self.samples["frame"].index_select(0, torch.as_tensor(rows)).long())
 
     def match(self, rows: Rows) -> Tensor:
         """(batch,) int64: index of each sample's match in `matches`."""
@@ -241,12 +245,14 @@ def open_dataset(path: Path | str) -> Dataset:
     if wrong := not_of_repertoire(tuple(meta.get("commands", CLONED))):
         raise DatasetError(f"{document}: expected commands {wrong}; make it again with `teamclone dataset`")
     types = _open(folder / "player_types.npy", dtype="float32", shape=(len(meta["matches"]), None, len(FIELDS)))
+    server = _open(folder / "server_params.npy", dtype="float64", shape=(len(meta["matches"]), len(SERVER_FIELD)))
     return Dataset(
         path=folder.resolve(),
         meta=meta,
         frames=_table(folder / "frames", FRAME_ARRAYS, rows=meta["n_frames"]),
         samples=_table(folder / "samples", SAMPLE_ARRAYS, rows=meta["n_samples"]),
         player_types=types,
+        server_params=server,
     )
 
 

@@ -19,6 +19,7 @@ from teamclone.dataset.layout import CATEGORICAL_INDEX, FORMAT, FRAME_ARRAYS, SA
 from teamclone.errors import DatasetError
 from teamclone.rcss.commands import CLONED
 from teamclone.rcss.player_types import FIELDS
+from teamclone.rcss.server_params import SERVER_DEFAULTS, SERVER_FIELD
 from teamclone.system.files import held
 
 _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
@@ -73,11 +74,14 @@ class DatasetWriter:
                 least, most = self._ranges.get(name, (0, -1))
                 self._ranges[name] = min(least, int(values.min())), max(most, int(values.max()))
 
-    def finish(self, *, player_types: NDArray[np.floating], meta: Mapping[str, Any]) -> None:
+    def finish(
+        self, *, player_types: NDArray[np.floating], server_params: NDArray[np.floating], meta: Mapping[str, Any]
+    ) -> None:
         """Complete the dataset.
 
         Args:
             player_types: (n_matches, n_types, len(FIELDS)), SI units; unused types of a match as type 0.
+            server_params: (n_matches, len(server_params.FIELDS)).
             meta: goes into ``dataset.json``; must hold ``team`` and ``matches``, a list of dictionaries, one per match,
                 with a ``side`` of "right" where the modelled team was that; and ``commands``, unless they are CLONED.
 
@@ -92,6 +96,14 @@ class DatasetWriter:
         array = Array(name="player_types", dtype="float32", shape=types.shape[1:], about="")
         self._files["", array.name] = _ArrayFile(self._folder / f"{array.name}.npy", array)
         self._files["", array.name].append(types)
+        server = np.ascontiguousarray(server_params, np.float64)
+        if server.shape != (len(meta["matches"]), len(SERVER_FIELD)):
+            raise DatasetError(
+                f"{self._where}/server_params: expected {(len(meta['matches']), len(SERVER_FIELD))}, got {server.shape}"
+            )
+        array = Array(name="server_params", dtype="float64", shape=server.shape[1:], about="")
+        self._files["", array.name] = _ArrayFile(self._folder / f"{array.name}.npy", array)
+        self._files["", array.name].append(server)
         digest = hashlib.blake2b(digest_size=8)
         for file in self._files.values():
             digest.update(file.finish())
@@ -214,13 +226,19 @@ def write_dataset(
     frames: Mapping[str, NDArray[Any]],
     samples: Mapping[str, NDArray[Any]],
     player_types: NDArray[np.floating],
+    server_params: NDArray[np.floating] | None = None,
     meta: Mapping[str, Any],
     replace: bool = False,
 ) -> Path:
-    """Write a dataset that lies in memory. Arguments and errors as of ``DatasetWriter`` and ``writing_dataset``."""
+    """Write a dataset that lies in memory; see ``DatasetWriter`` and ``writing_dataset`` for arguments and errors.
+
+    Without ``server_params`` all matches have the server's defaults.
+    """
+    if server_params is None:
+        server_params = np.tile(SERVER_DEFAULTS, (len(player_types), 1))
     with writing_dataset(folder, replace=replace) as writer:
         writer.add(frames=frames, samples=samples)
-        writer.finish(player_types=player_types, meta=meta)
+        writer.finish(player_types=player_types, server_params=server_params, meta=meta)
     return Path(folder)
 
 

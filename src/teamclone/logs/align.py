@@ -71,7 +71,7 @@ def body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.
 
 
 def first_body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Indices of the commands that take the body slot: the first of each frame and player (rcss.md 3.2).
+    """Indices of the commands that take the body slot: the first of each frame and player (rcssserver ``player.cpp``).
 
     Args:
         commands: with ``frame``, ``side``, ``unum``, ``kind``, ``valid``, in log order.
@@ -111,3 +111,25 @@ def executed_kind(frames: Columns, players: Columns) -> NDArray[np.uint8]:
         kinds[:-1][rose] = kind
     kinds[~follows(frames)] = 0
     return kinds
+
+
+def executed_commands(
+    players: Columns, frame: NDArray[Any], slot: NDArray[Any], kind: NDArray[Any]
+) -> NDArray[np.bool_]:
+    """Return whether the server executed commands: whether the counter of its kind rose until the next frame.
+
+    Unlike `executed_kind` this asks about a command that was received. So it is taken as executed also where the next
+    frame is not the next step of the simulator, and where the counter begins with a missing value.
+
+    Args:
+        players: ``columns.PLAYERS`` with the counters, (n_frames, 22).
+        frame: (n,) the frame that each command was decided on, which has a successor.
+        slot: (n,) as `slot_of` gives it. kind: (n,) CommandKind ids of BODY_KINDS.
+    """
+    rose = np.zeros(len(frame), np.bool_)
+    for one in np.unique(kind):
+        of_kind = kind == one
+        at, who = frame[of_kind], slot[of_kind]
+        counter = players[counter_name(CommandKind(one))]
+        rose[of_kind] = counter[at + 1, who] > np.maximum(counter[at, who], 0)
+    return rose

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from teamclone.models.config import ModelConfig
 from teamclone.models.heads.mixture import AtBall, EnsembleHead, MixtureHead, PointHead, Prediction, Situation
-from teamclone.models.inputs.egocentric import RelativeFeatures
+from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.paper import Features, PaperFeatures
 from teamclone.models.layers.players import Crowd
 from teamclone.models.layers.targets import COLUMNS, Aims, layers
@@ -31,7 +31,7 @@ class AimedTrunk(nn.Module):
     aim_columns: Tensor
     signs: Tensor
 
-    def __init__(self, config: ModelConfig, features: RelativeFeatures) -> None:
+    def __init__(self, config: ModelConfig, features: EgocentricFeatures) -> None:
         super().__init__()
         activation = _ACTIVATIONS[config.activation]
         self.n_inputs = features.n_inputs
@@ -93,7 +93,7 @@ class Trunks(nn.Module):
 class Clone(nn.Module):
     """A network that plays like a team: which command a player gives in a situation, and with which parameters."""
 
-    features: PaperFeatures | RelativeFeatures
+    features: PaperFeatures | EgocentricFeatures
     trunk: nn.Sequential | AimedTrunk | Trunks
     head: PointHead | MixtureHead | EnsembleHead
 
@@ -104,7 +104,7 @@ class Clone(nn.Module):
             self.features = PaperFeatures(own_type=config.own_type, all_types=config.all_types)
         else:
             blocks = tuple({*config.blocks, *config.kick_blocks})
-            self.features = RelativeFeatures(blocks, others=bool(config.kick_attention))
+            self.features = EgocentricFeatures(blocks, others=bool(config.kick_attention))
         trunks = [_trunk(config, self.features) for _ in range(config.members)]
         heads = [_head(config) for _ in range(config.members)]
         self.trunk = trunks[0] if config.members == 1 else Trunks(trunks)
@@ -152,8 +152,8 @@ class Clone(nn.Module):
         return prediction.logits.softmax(1), prediction.parameters
 
 
-def _trunk(config: ModelConfig, features: PaperFeatures | RelativeFeatures) -> nn.Sequential | AimedTrunk:
-    if isinstance(features, RelativeFeatures):
+def _trunk(config: ModelConfig, features: PaperFeatures | EgocentricFeatures) -> nn.Sequential | AimedTrunk:
+    if isinstance(features, EgocentricFeatures):
         return AimedTrunk(config, features)
     return layers((len(features.names), *config.hidden), _ACTIVATIONS[config.activation], config.dropout)
 

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
-from teamclone.models.inputs.reach import NEAR_M, TURN_MARGIN_DEG
+from teamclone.planner.constants import BALL_DECAY, BALL_SPEED_MAX, NEAR_M, TURN_MARGIN_DEG
 from teamclone.planner.field_evaluator import worth
 from teamclone.planner.passes import TACKLED_CYCLES
 from teamclone.planner.players import (

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
-from teamclone.models.inputs.reach import BALL_SIZE
+from teamclone.planner.constants import BALL_DECAY, BALL_SIZE, BALL_SPEED_MAX
 from teamclone.planner.players import (
     AREA,
     BALL,

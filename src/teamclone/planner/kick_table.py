@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.models.inputs.paper import BALL_DECAY
-from teamclone.models.inputs.reach import BALL_SIZE
+from teamclone.planner.constants import BALL_DECAY, BALL_SIZE
 from teamclone.planner.hold_ball import blur
 from teamclone.planner.players import (
     AREA,

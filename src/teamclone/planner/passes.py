@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.planner.constants import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.planner.field_evaluator import worth
 from teamclone.planner.players import (
     AREA,

@@ -21,8 +21,6 @@ from numba import njit
 from numpy.typing import NDArray
 from torch import Tensor
 
-from teamclone.models.inputs import paper as features
-from teamclone.models.inputs import reach as physics
 from teamclone.planner import dribble as dribbles
 from teamclone.planner import passes
 from teamclone.planner.dribble import best_dribble, best_going_on, best_run, underway
@@ -68,7 +66,7 @@ from teamclone.planner.players import (
 )
 from teamclone.planner.shoot import best_shot
 from teamclone.planner.tackle import best_tackle, can_tackle
-from teamclone.rcss import pitch
+from teamclone.rcss import pitch, server_params
 from teamclone.system.compiling import tell_when_compiled
 from teamclone.world.channels import CHANNEL
 from teamclone.world.state import State
@@ -287,8 +285,8 @@ def plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> Non
 def _compiled() -> Any:
     """A kernel that plans on many scenes."""
     # Numba keeps what it compiled as long as the file of this function stays the same. It hangs on all of these.
-    constants = (Path(str(module.__file__)) for module in (features, physics, pitch))
-    sources = (*sorted(Path(__file__).parent.glob("*.py")), *constants)
+    elsewhere = (Path(str(module.__file__)) for module in (pitch, server_params))
+    sources = (*sorted(Path(__file__).parent.glob("*.py")), *elsewhere)
     version = zlib.crc32(b"".join(path.read_bytes() for path in sources))
 
     @njit(cache=True, nogil=True, error_model="numpy")
@@ -328,5 +326,6 @@ def _(ball: Tensor, players: Tensor, types: Tensor, actor: Tensor) -> Tensor:
 
 def plans(state: State) -> Tensor:
     """(batch, len(PLAN)), on the device of the state and of its type; of who is far from the ball nothing is asked."""
-    made: Tensor = _plans(state.ball, state.players, state.types, state.actor)
+    each = state.each()
+    made: Tensor = _plans(each.ball, each.players, each.types, each.actor)
     return made

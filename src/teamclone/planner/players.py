@@ -12,8 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
-from teamclone.models.inputs.reach import BALL_SIZE, TURN_MARGIN_DEG
+from teamclone.planner.constants import BALL_DECAY, BALL_SIZE, BALL_SPEED_MAX, TURN_MARGIN_DEG
 from teamclone.rcss import pitch
 from teamclone.world.channels import CHANNEL, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING, TYPE_FIELD
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
+from teamclone.planner.constants import BALL_DECAY, BALL_SPEED_MAX
 from teamclone.planner.passes import BEHIND_M
 from teamclone.planner.players import (
     AREA,

@@ -20,7 +20,7 @@ from torch import Tensor
 from teamclone.dataset.layout import CATEGORICAL_INDEX, MEASURED_INDEX, MISSING, STEPS
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
-from teamclone.models.inputs.paper import BODY_LIMIT_DEG, PaperFeatures, TypeParameters
+from teamclone.models.inputs.paper import BODY_LIMIT_DEG, PaperFeatures, TypeParameters, logged_ball_speed_max
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import FIELDS
 from teamclone.world.channels import TYPE_FIELD
@@ -51,7 +51,7 @@ class Gather:
             kinds.reshape(-1, len(FIELDS)),
             kinds.shape[1],
             (kinds[..., TYPE_FIELD["player_speed_max"]] * kinds[..., TYPE_FIELD["player_decay"]]).reshape(-1),
-            features.ball_limit.cpu().numpy(),
+            logged_ball_speed_max(dataset.server_params.to(torch.float32)).numpy(),
             *_type_parameters(features.own_type),
             *_type_parameters(features.all_types),
             features.normalisation.mean.cpu().numpy(),
@@ -114,7 +114,7 @@ def _gather(
     parameters: NDArray[np.float32],
     types_per_match: int,
     speed: NDArray[np.float32],
-    ball_limit: NDArray[np.float32],
+    ball_speed: NDArray[np.float32],
     own_field: NDArray[np.int64],
     own_middle: NDArray[np.float32],
     own_half: NDArray[np.float32],
@@ -128,7 +128,7 @@ def _gather(
     n_samples, n_frames = len(sample_frame), len(frame_match)
     place = np.empty(22, np.int64)
     value, bound = np.empty_like(mean), np.ones_like(mean)
-    bound[:4] = ball_limit
+    bound[0], bound[1] = _MAX_X, _MAX_Y
     bound[4:26], bound[26:48], bound[48:70] = _MAX_X, _MAX_Y, _BODY_LIMIT
     bound[114], bound[115], bound[116] = _MAX_X, _MAX_Y, _BODY_LIMIT
     for index in range(len(rows)):
@@ -156,6 +156,7 @@ def _gather(
         if first < 0 or first >= len(speed):
             return index
         value[:4] = ball[frame]
+        bound[2] = bound[3] = ball_speed[frame_match[frame]]
         for player in range(22):
             channels = measured[frame, player]
             if categorical[frame, player, _TYPE] >= types_per_match:

@@ -35,22 +35,19 @@ def _arguments(commands: tuple[str, ...]) -> Tensor:
 
 
 def mirror_state(state: State, places: Tensor) -> State:
-    """The situations reflected: y, vy, body and neck negated, now and before; every player in his counterpart's place.
+    """Return the situations reflected: y, vy, body and neck negated, now and before; players in exchanged places.
 
     Args:
-        places: (22,) int64, as `mirror_places` gives them: who is whose counterpart.
+        places: (22,) int64, each player's counterpart, as `mirror_places` gives them.
     """
     ball, channels = _BALL.to(state.ball), _CHANNELS.to(state.players)
-    return State(
+    return state._replace(
         ball=state.ball * ball,
         players=state.players.index_select(1, places) * channels,
         types=state.types.index_select(1, places),
-        actor=places[state.actor],
         past_ball=state.past_ball * ball,
         past_players=state.past_players.index_select(2, places) * channels,
-        past_known=state.past_known,
-        mode=state.mode,
-        mode_cycles=state.mode_cycles,
+        actor=places[state.actor],
     )
 
 

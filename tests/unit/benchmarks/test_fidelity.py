@@ -17,7 +17,7 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.evaluation.evaluate import predict
 from teamclone.models.clone import Clone
-from teamclone.models.inputs.egocentric import RelativeFeatures
+from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.rcss.player_types import DEFAULTS
 from teamclone.training.config import load_config
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
@@ -122,7 +122,7 @@ def test_training_matches_take_turns_by_opponent(work: fidelity.Work) -> None:
 
 
 def test_inputs_made_once_are_those_of_each_choice_of_blocks(work: fidelity.Work) -> None:
-    features = RelativeFeatures(("ball", "past", "rivals"))
+    features = EgocentricFeatures(("ball", "past", "rivals"))
     state = work.dataset.state(work.rows, history=features.history)
     torch.testing.assert_close(work.inputs_of(features), features.project(state))
     model = Clone(load_config("best", ["model.hidden=[8]"]).model)

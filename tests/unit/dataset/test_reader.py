@@ -58,6 +58,8 @@ def test_rows_become_raw_states(tmp_path: Path) -> None:
     dataset = open_dataset(tiny(tmp_path / "ds"))
     rows = np.array([1, 0, 1])
     state = dataset.state(rows)
+    assert (len(state.ball), state.frame.tolist()) == (2, [1, 0, 1])  # a frame of several samples comes once
+    state = state.each()
     assert state.ball.tolist() == [[1.5, -2.0, 0.25, -0.5], [0] * 4, [1.5, -2.0, 0.25, -0.5]]
     assert state.actor.tolist() == [7, 5, 7]
     assert state.players.shape == (3, 22, len(PLAYER_CHANNELS))
@@ -74,18 +76,18 @@ def test_rows_become_raw_states(tmp_path: Path) -> None:
 
 
 def test_the_play_mode_is_seen_from_the_modelled_teams_side(tmp_path: Path) -> None:
-    """Of two matches, the team on the right in the second; a mode begins anew where frames are left out."""
+    """Of two matches, the team on the right in the second."""
     make_dataset(tmp_path / "ds", frames_per_match=5)
     made = open_dataset(tmp_path / "ds")
     modes = [PlayMode.PLAY_ON, *[PlayMode.KICK_IN_L] * 3, PlayMode.GOAL_R]
     made.frames["playmode"][:10] = torch.tensor(modes * 2)
-    made.frames["cycle"][:10] = torch.tensor([1, 2, 3, 7, 8, 1, 2, 3, 3, 3])
+    made.frames["mode_cycles"][:10] = torch.tensor([0, 0, 1, 5, 0, 0, 0, 1, 2, 0])
     made.meta["matches"][1]["side"] = "right"
     rows = np.array([10 * frame for frame in range(10)])
     state = made.state(rows)
     right = [PlayMode.PLAY_ON, *[PlayMode.KICK_IN_R] * 3, PlayMode.GOAL_L]
     assert state.mode.tolist() == [*modes, *right]
-    assert state.mode_cycles.tolist() == [0, 0, 1, 0, 0, 0, 0, 1, 2, 0]
+    assert state.mode_cycles.tolist() == [0, 0, 1, 5, 0, 0, 0, 1, 2, 0]
     assert made.mode(rows).tolist() == state.mode.tolist()
 
 
@@ -143,7 +145,7 @@ def followed(folder: Path) -> Path:
 
 def test_history_is_the_cycles_before_in_the_same_match(tmp_path: Path) -> None:
     rows = np.array([9, 2, 0, 3, 4, 5, 6, 7])
-    state = open_dataset(followed(tmp_path / "ds")).state(rows, history=2)
+    state = open_dataset(followed(tmp_path / "ds")).state(rows, history=2).each()
     known = {0: (0, 0), 2: (1, 1), 3: (0, 0), 4: (1, 0), 5: (0, 0), 6: (0, 0), 7: (1, 0), 9: (1, 1)}
     assert state.past_known.int().tolist() == [list(known[row]) for row in rows]
     assert state.past_ball.shape == (8, 2, 4)

@@ -59,7 +59,7 @@ def test_rows_do_not_depend_on_each_other() -> None:
     state = random_state(17)
     whole = model.predict(state)
     for row in (0, 16):
-        alone = model.predict(State(*(tensor[row : row + 1] for tensor in state)))
+        alone = model.predict(state.select(slice(row, row + 1)))
         for one, all_ in zip(alone, whole, strict=True):
             assert torch.allclose(one[0], all_[row], atol=1e-2, rtol=1e-3)
 
@@ -131,7 +131,7 @@ def test_relative_models_answer_alike_alone_and_in_batches(config: ModelConfig) 
     if config.head == "mixture":
         assert (parameters[:, [0, 3]] >= 0).all()
     for rows in (slice(0, 1), slice(16, 17), slice(4, 7)):
-        part = model.predict(State(*(tensor[rows] for tensor in state)))
+        part = model.predict(state.select(rows))
         for one, whole in zip(part, (probabilities, parameters), strict=True):
             assert torch.allclose(one, whole[rows], atol=1e-2, rtol=1e-3)
 
@@ -264,7 +264,7 @@ def test_turns_teach_the_aims_and_nothing_else_through_their_own_bell() -> None:
     assert taught(alone.total, model) == {"trunk.aims"}
     turns = target.kind == CLONED_KINDS.index(CommandKind.TURN)
     without = Target(target.kind[~turns], target.parameters[~turns])
-    others = model.output(State(*(tensor[~turns] for tensor in state)))
+    others = model.output(state.select(~turns))
     assert model.head.loss(others, without, aim_weight=0.5).total == model.head.loss(others, without).total
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from benchmarks.kicks import kicked
 from tests.situations import put, resting, situations
 
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.dataset.reader import open_dataset
-from teamclone.models.inputs.reach import kicked
 from teamclone.planner.kick_table import COUNTS, PLACES, paths
 from teamclone.planner.plan import CHOICES, KICK_OF, NEAR_BALL_M, PLAN, WAYS, WORTHS, plans
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
@@ -89,9 +89,9 @@ def test_who_cannot_kick_plans_nothing() -> None:
     assert (made[able][:, 1 : 1 + len(CHOICES)].sum(1) == 1).all()
     assert torch.isfinite(made).all()
     # One at a time they are the same.
-    one = State(*(part[able][:1] for part in state))
+    one = state.select(able).select(slice(1))
     assert torch.equal(plans(one), made[able][:1])
-    assert plans(State(*(part[:0] for part in state))).shape == (0, len(PLAN))
+    assert plans(state.select(slice(0))).shape == (0, len(PLAN))
     assert NEAR_BALL_M > AREA + 0.1
 
 
@@ -367,8 +367,7 @@ def test_agents_of_real_matches_do_as_planned(samples_dir: Path, tmp_path: Path)
     assert len(rows) > 100
     state = data.state(rows.numpy())
     made = plans(state)
-    me, types = (part[torch.arange(len(rows)), state.actor] for part in (state.players, state.types))
-    given = kicked(state.ball, me, types, target.parameters[rows])
+    given = kicked(state, target.parameters[rows])
     ways = made[:, PLAN.index("shot_vx") :].view(-1, len(WAYS), 2)
     there = made[:, PLAN.index("shot_there") :][:, : len(WAYS)] > 0
     exact = ((ways - given[:, None]).norm(dim=2) < 0.004) & there

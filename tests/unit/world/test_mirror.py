@@ -9,7 +9,8 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import open_dataset
 from teamclone.models.config import BLOCKS
-from teamclone.models.inputs.egocentric import GEOMETRY, RelativeFeatures
+from teamclone.models.inputs.egocentric import EgocentricFeatures
+from teamclone.models.inputs.geometry import GEOMETRY
 from teamclone.models.inputs.paper import PaperFeatures
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.world.channels import CHANNEL
@@ -102,9 +103,11 @@ def test_the_papers_inputs_of_a_mirrored_state(state: State) -> None:
         assert torch.equal(mirrored[f"{who}_{what}"], sign * column), name
 
 
-@pytest.mark.parametrize("features", [PaperFeatures(own_type=True, all_types=("movement",)), RelativeFeatures(BLOCKS)])
+@pytest.mark.parametrize(
+    "features", [PaperFeatures(own_type=True, all_types=("movement",)), EgocentricFeatures(BLOCKS)]
+)
 def test_inputs_of_a_mirrored_state_are_those_of_the_state(
-    state: State, features: PaperFeatures | RelativeFeatures
+    state: State, features: PaperFeatures | EgocentricFeatures
 ) -> None:
     """With other signs and in other columns. Of ties, see below, and of plans an odd sample may differ."""
     plain, mirrored = (features.project(of) for of in (state, mirror_state(state, PLACES)))
@@ -115,7 +118,7 @@ def test_inputs_of_a_mirrored_state_are_those_of_the_state(
 
 def test_relative_inputs_of_a_mirrored_state(state: State) -> None:
     """Each column is the same or its opposite; role, which knows the number, the counterpart's."""
-    features = RelativeFeatures(BLOCKS)
+    features = EgocentricFeatures(BLOCKS)
     columns, mirrored = (features.project(of).double() for of in (state, mirror_state(state, PLACES)))
     names = [name.rpartition("_")[0] for name in features.names]
     role = [i for i, name in enumerate(names) if name == "role"]

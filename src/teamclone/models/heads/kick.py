@@ -10,11 +10,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from teamclone.dynamics.formulas import covered, roll
 from teamclone.models import distributions as mixture
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
-from teamclone.models.inputs.egocentric import MATES, geometry_of, mates_of, ways_of
-from teamclone.models.inputs.paper import BALL_DECAY, BALL_SPEED_MAX
-from teamclone.models.inputs.reach import covered
+from teamclone.models.inputs.geometry import MATES, geometry_of, mates_of, ways_of
 from teamclone.planner.plan import WAYS
 from teamclone.rcss import pitch
 
@@ -136,14 +135,15 @@ class Kicks(nn.Module):
         base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, FREE, -1)], 1)
         way = base + LEAD_M * torch.stack([ahead, aside], -1) - ball
         direction = way / torch.sqrt(way.square().sum(-1, keepdim=True) + 1e-6)
-        return direction * (BALL_SPEED_MAX * torch.sigmoid(speed))[..., None]
+        return direction * (geometry_of(geometry, "ball_speed_max")[0] * torch.sigmoid(speed))[..., None]
 
     def _dribbled(self, ahead: Tensor, aside: Tensor, geometry: Tensor) -> Tensor:
         """(batch, components, 2) velocities that bring the ball before him after a kick and dashes straight on."""
         decay, forward, sideways, gain = geometry_of(geometry, "decay", "forward", "aside", "dash_gain")
-        coasted = (1 - decay**self.cycles) / (1 - decay)
+        coasted = roll(self.cycles, decay)
         run = forward * coasted + covered(self.cycles - 1, 100.0 * gain, decay)
         along, across = run + AHEAD_M + TOUCH_M * ahead, sideways * coasted + TOUCH_M * aside
         x, y, cos, sin, ball_x, ball_y = geometry_of(geometry, "x", "y", "cos", "sin", "ball_x", "ball_y")
         way = torch.stack([x + along * cos - across * sin - ball_x, y + along * sin + across * cos - ball_y], -1)
-        return way * ((1 - BALL_DECAY) / (1 - BALL_DECAY**self.cycles))[:, None]
+        rolled: Tensor = roll(self.cycles, geometry_of(geometry, "ball_decay")[0])
+        return way / rolled[..., None]

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from teamclone.models import distributions as mixture
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_PLACE, LEAST_POWER, Mixture, wrap
 from teamclone.models.heads.kick import Kicks
-from teamclone.models.inputs.egocentric import geometry_of, tackle_of
+from teamclone.models.inputs.geometry import geometry_of, tackle_of
 from teamclone.models.loss import Balance, Loss, ParameterLoss, mixture_loss, on, point_loss
 from teamclone.planner import tackle as tackling
 from teamclone.rcss import pitch

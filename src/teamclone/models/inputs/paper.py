@@ -10,18 +10,19 @@ from torch import Tensor, nn
 
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import GROUPS, RANGES
+from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.world.channels import CHANNEL, TYPE_FIELD
 from teamclone.world.state import State
 
-BALL_SPEED_MAX = 3.0
-BALL_DECAY = 0.94
-"""rcssserver `serverparam.cpp`: ball_speed_max, ball_decay."""
-LOGGED_BALL_SPEED_MAX = BALL_SPEED_MAX * BALL_DECAY
-"""Logs hold velocities after decay, so this is the fastest ball of a log."""
 BODY_LIMIT_DEG = 180.0
 
 PLAYERS = (*(f"team_{number}" for number in range(1, 12)), *(f"opponent_{number}" for number in range(1, 12)))
 """The player axis of a state, by name."""
+
+
+def logged_ball_speed_max(server: Tensor) -> Tensor:
+    """Return (...) the fastest ball of a log, whose velocities are after decay; ``server`` (..., server fields)."""
+    return server[..., SERVER_FIELD["ball_speed_max"]] * server[..., SERVER_FIELD["ball_decay"]]
 
 
 class Features(Protocol):
@@ -102,8 +103,7 @@ class PaperFeatures(nn.Module):
             names += [f"{player}_{name}" for name in self.all_types.names for player in PLAYERS]
         self.names = tuple(names)
         self.normalisation = Normalisation(len(names))
-        ball = torch.tensor([pitch.MAX_X, pitch.MAX_Y, LOGGED_BALL_SPEED_MAX, LOGGED_BALL_SPEED_MAX])
-        self.register_buffer("ball_limit", ball, persistent=False)
+        self.register_buffer("ball_limit", torch.tensor([pitch.MAX_X, pitch.MAX_Y]), persistent=False)
         sided = [name.rpartition("_")[2] in ("y", "vy", "body") for name in names]
         self.register_buffer("signs", torch.where(torch.tensor(sided), -1.0, 1.0), persistent=False)
 
@@ -111,7 +111,7 @@ class PaperFeatures(nn.Module):
         """(len(names),) which column holds in the mirror, but for its sign, what this one holds.
 
         Args:
-            places: as of `mirror.mirror_state`.
+            places: (22,) each player's counterpart, see `mirror.mirror_places`.
         """
         column = {name: index for index, name in enumerate(self.names)}
         order = list(range(len(self.names)))
@@ -122,7 +122,7 @@ class PaperFeatures(nn.Module):
         return torch.tensor(order)
 
     def project(self, state: State) -> Tensor:
-        """(batch, len(names)) before normalisation."""
+        """Return (batch, len(names)) before normalisation."""
         speed = state.types[..., TYPE_FIELD["player_speed_max"]] * state.types[..., TYPE_FIELD["player_decay"]]
         players = torch.stack(
             (
@@ -133,18 +133,15 @@ class PaperFeatures(nn.Module):
                 state.players[..., CHANNEL["vy"]] / speed,
             ),
             dim=1,
-        )  # (batch, 5, 22)
-        actor = state.actor[:, None, None]
-        parts = [
-            state.ball / self.ball_limit,
-            players.flatten(1),
-            players.gather(2, actor.expand(-1, players.shape[1], 1)).squeeze(2),
-        ]
+        )  # (frames, 5, 22)
+        frame, actor = state.frame, state.actor
+        ball_speed = logged_ball_speed_max(state.server)[:, None]
+        ball = torch.cat([state.ball[:, :2] / self.ball_limit, state.ball[:, 2:] / ball_speed], 1)
+        parts = [ball[frame], players.flatten(1)[frame], players[frame, :, actor]]
         if self.own_type is not None:
-            own = state.types.gather(1, actor.expand(-1, 1, state.types.shape[2]))
-            parts.append(self.own_type(own).flatten(1))
+            parts.append(self.own_type(state.types[frame, actor][:, None]).flatten(1))
         if self.all_types is not None:
-            parts.append(self.all_types(state.types).flatten(1))
+            parts.append(self.all_types(state.types).flatten(1)[frame])
         return torch.cat(parts, dim=1)
 
     def fit(self, chunks: Iterable[Tensor]) -> None:

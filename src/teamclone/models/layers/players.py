@@ -12,9 +12,9 @@ import math
 import torch
 from torch import Tensor, nn
 
+from teamclone.dynamics.formulas import cycles_over
 from teamclone.models.config import ATTENTION_HEADS
-from teamclone.models.inputs.egocentric import MATES, OTHER, OTHERS, geometry_of, others_of
-from teamclone.models.inputs.paper import BALL_DECAY
+from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, geometry_of, others_of
 from teamclone.rcss import pitch
 
 COLUMNS = 17
@@ -75,6 +75,7 @@ class Crowd(nn.Module):
         """(batch, OTHERS + 1, COLUMNS): the others, then the goal, as seen from the ball."""
         others = others_of(geometry)
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)
+        decay = geometry_of(geometry, "ball_decay")[0][..., None]
         goal = torch.zeros_like(others[:, :1])
         goal[..., :2], goal[..., _THERE] = self.goal, 1.0
         every = torch.cat([others, goal], 1)
@@ -90,13 +91,13 @@ class Crowd(nn.Module):
                 way / distance,
                 every[..., 2:],
                 kind.expand(every.shape[0], -1, -1),
-                _lane(way, distance[..., 0], others[:, MATES:], ball),
+                _lane(way, distance[..., 0], others[:, MATES:], ball, decay),
             ],
             -1,
         )
 
 
-def _lane(way: Tensor, distance: Tensor, opponents: Tensor, ball: Tensor) -> Tensor:
+def _lane(way: Tensor, distance: Tensor, opponents: Tensor, ball: Tensor, decay: Tensor) -> Tensor:
     """(batch, places, 4) how free a straight kick to each place is.
 
     Radians between it and the nearest opponent before the place; cycles that the ball is there before the first of
@@ -105,6 +106,7 @@ def _lane(way: Tensor, distance: Tensor, opponents: Tensor, ball: Tensor) -> Ten
 
     Args:
         way: (batch, places, 2) from the ball. distance: its length. opponents: (batch, 11, len(OTHER)).
+        decay: (batch, 1, 1) of the ball.
     """
     forward = (way / distance[..., None])[:, :, None]
     from_ball = (opponents[..., :2] - ball[:, None])[:, None]
@@ -113,8 +115,7 @@ def _lane(way: Tensor, distance: Tensor, opponents: Tensor, ball: Tensor) -> Ten
     across = (forward[..., 0] * from_ball[..., 1] - forward[..., 1] * from_ball[..., 0]).abs()
     before = there & (along > 0) & (along < distance[..., None] + 1)
     angle = torch.where(before, torch.atan2(across, along.clamp(min=0.1)), math.pi).amin(-1)
-    # The ball rolls v (1 - d^t) / (1 - d) in t cycles.
-    rolled = torch.log((1 - along.clamp(min=0) * (1 - BALL_DECAY) / PASS_SPEED).clamp(min=0.02)) / math.log(BALL_DECAY)
+    rolled = cycles_over(along.clamp(min=0), PASS_SPEED, decay, least=0.02)
     run = (across - 1.0).clamp(min=0) / RUN_SPEED + 1
     ahead = torch.where(before, run - rolled, NEVER_CYCLES).amin(-1).clamp(-NEVER_CYCLES, NEVER_CYCLES)
     gap = (way[:, :, None] - from_ball).norm(dim=-1)

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from teamclone.models.inputs.egocentric import geometry_of
+from teamclone.models.inputs.geometry import geometry_of
 from teamclone.rcss import pitch
 
 COLUMNS = 10

@@ -65,7 +65,7 @@ def test_answers_of_any_commands(config: ModelConfig, further: tuple[str, ...]) 
     limits = torch.tensor([item.limit for item in parameters_of(model.config.commands)])
     assert parameters.shape == (9, len(limits))
     assert (parameters.abs() <= limits + 1e-3).all()
-    alone = model.predict(State(*(tensor[4:5] for tensor in state)))
+    alone = model.predict(state.select(slice(4, 5)))
     for one, whole in zip(alone, (probabilities, parameters), strict=True):
         assert torch.allclose(one[0], whole[4], atol=1e-2, rtol=1e-3)
 

@@ -26,7 +26,7 @@ from teamclone.models.heads.kick import (
     Kicks,
 )
 from teamclone.models.heads.mixture import TACKLE_DIRECTIONS, MixtureHead, class_of
-from teamclone.models.inputs.egocentric import GEOMETRY, MATES
+from teamclone.models.inputs.geometry import GEOMETRY, MATES
 from teamclone.planner.plan import PLAN, WAYS, plans
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 from teamclone.world.mirror import mirror_state, mirror_target
@@ -174,7 +174,7 @@ def model(request: pytest.FixtureRequest) -> Clone:
     model = Clone(replace(MODEL, kick_attention=attention))
     # Of samples that lean to one side.
     state = situations(100, seed=5)
-    model.inputs.fit([model.inputs.project(State(*(tensor[state.ball[:, 1] > 0] for tensor in state)))])
+    model.inputs.fit([model.inputs.project(state.select(state.ball[:, 1] > 0))])
     return model.eval()
 
 

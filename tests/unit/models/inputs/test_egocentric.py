@@ -9,17 +9,8 @@ from tests.situations import put, resting, situations
 from torch import Tensor
 
 from teamclone.models.config import BLOCKS
-from teamclone.models.inputs.egocentric import (
-    CLIP,
-    GEOMETRY,
-    MATES,
-    NEAREST_OPPONENTS,
-    PAST_FRAMES,
-    RIVALS,
-    TACKLE,
-    WAY,
-    RelativeFeatures,
-)
+from teamclone.models.inputs.egocentric import CLIP, NEAREST_OPPONENTS, PAST_FRAMES, RIVALS, EgocentricFeatures
+from teamclone.models.inputs.geometry import GEOMETRY, MATES, TACKLE, WAY
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.world.channels import (
@@ -38,7 +29,7 @@ from teamclone.world.state import State
 SEEN = tuple(block for block in BLOCKS if block != "plan")
 """All but what is planned, which has tests of its own."""
 PARTS = ("scene", *SEEN, "geometry")
-FEATURES = RelativeFeatures(SEEN)
+FEATURES = EgocentricFeatures(SEEN)
 PLAYER = 11
 """Columns of one player in mates, opponents and rivals."""
 
@@ -61,7 +52,7 @@ def geometry(state: State) -> dict[str, float]:
 
 
 def copied(state: State) -> State:
-    return State(*(tensor.clone() for tensor in state))
+    return State._make(tensor.clone() for tensor in state)
 
 
 def polar(forward: float, aside: float) -> list[float]:
@@ -71,7 +62,7 @@ def polar(forward: float, aside: float) -> list[float]:
 
 def test_names_are_the_columns_and_unique() -> None:
     for blocks in (BLOCKS, (), ("past",), ("rivals", "self")):
-        features = RelativeFeatures(blocks)
+        features = EgocentricFeatures(blocks)
         projected = features.project(situations(3, history=features.history))
         assert projected.shape == (3, len(features.names))
         assert len(set(features.names)) == len(features.names)
@@ -82,7 +73,7 @@ def test_names_are_the_columns_and_unique() -> None:
 def test_blocks_keep_their_columns_whatever_else_there_is() -> None:
     """In the order of BLOCKS, however they are asked for."""
     whole = FEATURES.project(situations(5, history=PAST_FRAMES))
-    some = RelativeFeatures(("opponents", "self", "past"))
+    some = EgocentricFeatures(("opponents", "self", "past"))
     assert some.blocks == ("self", "opponents", "past")
     projected = some.project(situations(5, history=PAST_FRAMES))
     assert torch.equal(projected, torch.cat([part(whole, name) for name in ("scene", *some.blocks, "geometry")], 1))
@@ -98,7 +89,7 @@ def test_columns_finds_blocks() -> None:
 
 
 def test_inputs_are_normalised_and_limited_and_geometry_stays() -> None:
-    features = RelativeFeatures(("self", "ball"))
+    features = EgocentricFeatures(("self", "ball"))
     projected = features.project(situations(400))
     features.fit(projected.split(150))
     inputs = features.normalise(projected)
@@ -440,13 +431,13 @@ def test_signs_of_blocks_hang_on_nothing_else() -> None:
     signs = dict(zip(FEATURES.names, FEATURES.signs.tolist(), strict=True))
     for seed, blocks in enumerate((("self",), ("view", "past"), ("opponents", "rivals", "mates"))):
         torch.manual_seed(seed)
-        some = RelativeFeatures(blocks)
+        some = EgocentricFeatures(blocks)
         assert dict(zip(some.names, some.signs.tolist(), strict=True)) == {name: signs[name] for name in some.names}
 
 
 def test_normalised_inputs_are_mirrored_by_their_signs() -> None:
     """Also where the samples lean to one side, and where inputs are limited."""
-    features = RelativeFeatures(("self", "ball", "mates"))
+    features = EgocentricFeatures(("self", "ball", "mates"))
     state = situations(60)
     features.fit([features.project(state)[:20]])
     features.normalisation.std[: features.n_inputs] *= 0.1
@@ -456,7 +447,7 @@ def test_normalised_inputs_are_mirrored_by_their_signs() -> None:
 
 def test_channels_are_those_that_the_blocks_look_at() -> None:
     for blocks in ((), ("self", "mates", "past"), ("view",)):
-        features = RelativeFeatures(blocks)
+        features = EgocentricFeatures(blocks)
         state = situations(5, history=features.history)
         before = features.project(state)
         unread = [CHANNEL[name] for name in CHANNEL if name not in features.channels]

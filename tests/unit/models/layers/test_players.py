@@ -9,12 +9,13 @@ import torch
 from tests.situations import situations
 from torch import Tensor
 
-from teamclone.models.inputs.egocentric import GEOMETRY, MATES, OTHER, OTHERS, RelativeFeatures, others_of
+from teamclone.models.inputs.egocentric import EgocentricFeatures
+from teamclone.models.inputs.geometry import GEOMETRY, MATES, OTHER, OTHERS, others_of
 from teamclone.models.layers.players import COLUMNS, RUN_SPEED, TARGETS, Crowd
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
 from teamclone.world.state import State
 
-FEATURES = RelativeFeatures(("ball",), others=True)
+FEATURES = EgocentricFeatures(("ball",), others=True)
 
 
 def geometry_of(state: State) -> Tensor:

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from teamclone.models.inputs.egocentric import GEOMETRY, geometry_of
+from teamclone.models.inputs.geometry import GEOMETRY, geometry_of
 from teamclone.models.layers.targets import COLUMNS, Aims, layers
 
 SCALE = (0.75 * 52.5, 0.75 * 34.0)

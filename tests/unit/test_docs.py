@@ -12,7 +12,11 @@ import typer.main
 from teamclone.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS = {
+    name: command
+    for name, command in typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
+    if not command.hidden
+}
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))

@@ -1,15 +1,17 @@
-"""`teamclone run`."""
+"""`teamclone pipeline`."""
 
 from __future__ import annotations
 
+import sys
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 
-def run(
-    plan: Annotated[Path, typer.Argument(help="Plan (TOML) with what to play, and what to make of it.")],
+def pipeline(
+    schedule: Annotated[Path, typer.Argument(help="Schedule (TOML): what to play, and what to make of it.")],
     out: Annotated[
         Path, typer.Option("--out", help="Folder for all that is made; one that was begun is gone on with.")
     ],
@@ -21,16 +23,16 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what became of each stage and match as JSON.")] = False,
 ) -> None:
-    """Play, store, make the dataset, train, evaluate and report, as one plan says. What is there already is kept."""
+    """Play, store, make the dataset, train, evaluate and report. What is there already is kept."""
     from teamclone.cli.common import print_json, print_table, progress
     from teamclone.cli.play import line_of
     from teamclone.cli.train import reporter
     from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
     from teamclone.system.cluster import executor_of
 
-    asked = load_pipeline(plan)
-    with executor_of(scheduler, jobs=jobs) as executor, progress("run") as bar:
-        task = bar.add_task("", total=len(asked.plan.fixtures))
+    asked = load_pipeline(schedule)
+    with executor_of(scheduler, jobs=jobs) as executor, progress("pipeline") as bar:
+        task = bar.add_task("", total=len(asked.schedule.fixtures))
 
         def show(stage: Stage, done: int, total: int) -> None:
             bar.update(task, description=stage, completed=done, total=total)
@@ -67,3 +69,10 @@ def run(
             print(line_of(record))
     if report.failed:
         raise typer.Exit(1)
+
+
+@wraps(pipeline)
+def run(**options: Any) -> None:
+    """`pipeline` by the name that it had before."""
+    print("teamclone: run is now called pipeline; call teamclone pipeline instead", file=sys.stderr)
+    pipeline(**options)

@@ -6,14 +6,12 @@ import subprocess
 import sys
 import time
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import datagrams
 from datagrams import WHOLE, packet
 from teamclone.logs.columns import PLAYERS
 from teamclone.logs.rcg_text import read_text
@@ -161,11 +159,14 @@ def test_a_datagram_costs_no_more_than_its_length() -> None:
 
 def test_what_is_loaded_ahead_is_what_a_datagram_needs() -> None:
     code = (
-        "from datagrams import WHOLE; from teamclone.logs.scan import scan_shows; from teamclone.protocol import monitor\n"
-        "monitor.load_reader(); loaded = list(scan_shows.signatures)\n"
-        "assert monitor.show_of(WHOLE) is not None and loaded and scan_shows.signatures == loaded"
+        "from teamclone.logs.scan import scan_shows\n"
+        "from teamclone.protocol import monitor\n"
+        "monitor.load_reader()\n"
+        "loaded = list(scan_shows.signatures)\n"
+        f"assert monitor.show_of({WHOLE!r}) is not None\n"
+        "assert loaded and scan_shows.signatures == loaded"
     )
-    subprocess.run([sys.executable, "-c", code], cwd=Path(datagrams.__file__).parent, check=True)
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_requests_are_what_the_server_reads() -> None:

@@ -417,7 +417,7 @@ def _variants(
         spans = [np.ptp([value(entropy(result["sets"][item]["all"])) for result in seeds(results)]) for item in names]
         noise = (
             "\n\nOne seed each. The cross-entropies of the seeds of `best` lie "
-            f"{' / '.join(number(float(span), 4) for span in spans)} nats apart: smaller changes are within this spread."
+            f"{' / '.join(number(float(span), 4) for span in spans)} nats apart: smaller changes are within that."
         )
     return f"## {heading}\n\n{text}{noise}\n\n{table([*headers, 'minutes'], rows)}"
 

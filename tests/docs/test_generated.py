@@ -25,7 +25,7 @@ def test_every_page_with_a_block_is_written() -> None:
 
 def test_options_are_read_from_the_commands() -> None:
     page = PAGES[generate.REFERENCE / "commands" / "play.md"]
-    assert "teamclone play [PLAN] [OPTIONS]" in page
+    assert "teamclone play [SCHEDULE] [OPTIONS]" in page
     assert "| `--matches`, `-n` | whole number, at least 1 | `1` | Matches of --left and --right. |" in page
     assert "| `--set` | `KEY=VALUE`, repeatable |" in page
     assert "| `--out` | path | required |" in page

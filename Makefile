@@ -1,4 +1,4 @@
-# `make demo` and `make test` do all set-up on a fresh machine; everything goes into .venv and demo/.
+# `make demo`, `make test` and `make docs` do all set-up on a fresh machine; everything goes into .venv, demo/ and site/.
 
 PYTHON ?= python3
 VENV := .venv
@@ -12,14 +12,15 @@ OPTIONS ?=
 MINUTES ?= 30
 DEMO := demo
 
-.PHONY: help install browser demo test lint format bench fidelity faults fuzz clean
+.PHONY: help install browser demo test docs lint format bench fidelity faults fuzz clean
 
 help:
 	@echo "make demo     train and report a clone of HELIOS_base on the bundled matches"
 	@echo "make test     run the tests"
+	@echo "make docs     the documentation as one site, site/index.html; its generated pages and figures"
 	@echo "make lint     ruff and mypy"
 	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name, COPIES='1 3 39' of each match)"
-	@echo "make fidelity what clones know, and docs/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
+	@echo "make fidelity how good clones are, and docs/explanation/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
 	@echo "make faults   kill ingest, dataset and train KILLS times each and resume (default 50)"
 	@echo "make fuzz     fuzz every log reader for MINUTES (default 30)"
 	@echo "make install  only set up $(VENV)"
@@ -51,6 +52,13 @@ demo: install
 test: install browser
 	$(BIN)/python -m pytest -n 2 --dist loadscope
 
+# Broken links and pages that no menu lists are errors.
+docs: install
+	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/figures.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "Wrote site/index.html"
+
 lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -70,7 +78,7 @@ bench: install
 	$(BIN)/python benchmarks/stores.py $(MATCHES) --count 2
 
 fidelity: install
-	$(BIN)/python benchmarks/fidelity.py $(MATCHES) --out $(FIDELITY) --page docs/fidelity.md --team $(TEAM) $(OPTIONS)
+	$(BIN)/python benchmarks/fidelity.py $(MATCHES) --out $(FIDELITY) --page docs/explanation/fidelity.md --team $(TEAM) $(OPTIONS)
 
 faults: install
 	$(BIN)/python -m pytest tests/faults --kills $(KILLS) --timeout 0
@@ -80,4 +88,4 @@ fuzz: install
 	$(BIN)/python tests/faults/fuzz_readers.py .fuzz --minutes $(MINUTES)
 
 clean:
-	rm -rf $(VENV) $(DEMO) .bench $(FIDELITY) .fuzz build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEMO) site .bench $(FIDELITY) .fuzz build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

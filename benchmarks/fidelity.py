@@ -1,6 +1,6 @@
 """How faithful a clone is: baselines, presets, what each part gains, and why it stops; then writes the results page.
 
-    python benchmarks/fidelity.py MATCHES --out DIR [--only c,t,b,a,k,f,d,e,g] [--page docs/fidelity.md]
+    python benchmarks/fidelity.py MATCHES --out DIR [--only c,t,b,a,k,f,d,e,g] [--page docs/explanation/fidelity.md]
 
 MATCHES is a folder of logs. Steps, in the order in which --only names them:
 
@@ -645,7 +645,7 @@ EXACT_DEG = 1.0
 """The same of a tackle's direction; HELIOS Base chooses among 40, nine degrees apart."""
 
 
-SITUATIONS = ("ball kickable", "first of his team to the ball", "off the ball")
+SITUATIONS = ("ball kickable", "first of the team to the ball", "off the ball")
 
 
 def situations(state: State) -> NDArray[np.int64]:

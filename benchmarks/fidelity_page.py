@@ -156,9 +156,11 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def _head(results: Results) -> str:
     text = """# Fidelity
 
-How well clones of HELIOS_base know what the team will do, beside what we set out to reach, what each part of the
-preset `best` gains, and why it stops where it stops. `make fidelity MATCHES=folder` runs everything and writes this
-page; no figure of ours on it is typed by hand."""
+How well clones of HELIOS_base predict the team, compared with the goals of the project; what each part of the preset
+`best` contributes; and which errors remain. Both teams played with the full state; [what the figures
+mean](figures.md#full-state) says what changes without it. `make fidelity MATCHES=folder` runs everything and writes
+this
+page; no result on it is typed by hand."""
     if not results:
         text += "\n\nNothing has been run yet: the page holds the goals only."
     return text
@@ -179,10 +181,11 @@ def _protocol(cleaning: Mapping[str, Any]) -> str:
     return f"""## Protocol
 
 Whole matches are for training, validation or test, never for two of these. A row is a command that the server
-received of a field player in play_on; who keeps the goal is told by the log, not by his number. Goalkeepers' commands
+received of a field player in play_on; the goalkeeper is recognised by the state flag of the log, not by the number.
+Goalkeepers' commands
 are among the rows for training, and in no other split. Validation chose the settings and the checkpoint (`best-loss`);
-the test matches and the unseen opponent were looked at only to write this
-page. Cells with slashes give the sets in one order: each test match, then all matches of the unseen opponent.
+the test matches and the unseen opponent were used only to write this page. Cells with slashes give the sets in one
+order: each test match, then all matches of the unseen opponent.
 
 {table(("split", "opponent", "matches", *KINDS), rows)}"""
 
@@ -231,9 +234,8 @@ def _goals(results: Results) -> str:
         kicks = [next(iter(results.values()))["sets"][name]["all"]["commands"]["kick"]["support"] for name in names]
         about = f"""
 Sets: {" / ".join(names)}. There are {" / ".join(f"{count:,}" for count in tackles)} tackles and
-{" / ".join(f"{count:,}" for count in kicks)} kicks in them, so a single tackle moves its recall by far. A dash
-stands where nothing is
-predicted or nothing occurs. Rules give a constant for each parameter, the median of training.
+{" / ".join(f"{count:,}" for count in kicks)} kicks in them, so the recall of tackles is uncertain. `-` stands where
+nothing is predicted or nothing occurs. Rules give a constant for each parameter, the median of training.
 """
     return f"""## Goals and figures
 
@@ -282,8 +284,9 @@ def _numbers(results: Results) -> str:
     headers = ("", "accuracy, field players", "players 2-11", "cross-entropy, field players", "players 2-11")
     return f"""## Field players, and players 2 to 11
 
-A team may give its goalkeeper another number than 1. Then number 1 plays in the field, and who knows players by
-their number has never seen him there. The first column counts every field player; the second leaves number 1 out.
+A team may give its goalkeeper another number than 1. Then number 1 plays in the field, where a model that identifies
+players by number has never seen that number. The first column counts every field player; the second leaves number 1
+out.
 
 {table(headers, rows)}"""
 
@@ -304,26 +307,26 @@ degree; lower is better.
 {table(("command", *_sets(results), "an even guess"), rows)}"""
 
 
-ABLATIONS_TEXT = """`without-X` leaves a block of inputs out, of the command's and of the kick's part; `with-X`
-adds one to the command's part; the others change what their settings say. Changes are to `plain`, which has the other
-players of a kick as lists of the nearest and is trained by Adam on samples as they are, on the shorter schedule:
-positive nats are worse, of the command's cross-entropy and of the log loss of parameters alike."""
-TRAINING_TEXT = """How the preset is trained, beside `best-0`, each in its full length: `adam` moves all weights by
-Adam, as the paper does; `without-mirror` sees the training matches only as they were played."""
-REMEDIES_TEXT = """What is said to help with rare commands, beside `plain` on the same shorter schedule. The
+ABLATIONS_TEXT = """`without-X` leaves out a block of inputs, for the command and for the kick; `with-X` adds one for
+the command; the others change the settings shown. Changes are to `plain`, which gets the other players as lists of the
+nearest and is trained by Adam without mirrored samples, on the shorter schedule. Positive nats are worse, for the
+cross-entropy of the command and for the log loss of parameters."""
+TRAINING_TEXT = """Variants of how the preset is trained, compared with `best-0`, each in full length: `adam` updates
+all weights by Adam, as the paper does; `without-mirror` trains without mirrored samples."""
+REMEDIES_TEXT = """Common remedies for rare commands, compared with `plain` on the same shorter schedule. The
 class probabilities of balanced trainings are corrected for the balance unless `train.prior_correction`
 is off. `ensemble` trains three networks side by side."""
 
 
 KICKS_TEXT = {
     "short": "`short` is the preset `best` on the shorter schedule.",
-    "without-plan": "`without-plan` tells nothing of what is planned.",
-    "plan-of-kicks": "`plan-of-kicks` tells what is planned to the layers of a kick alone.",
-    "without-attention": """In `without-attention` the layers of a kick know of the others only what is planned and
-the two nearest of each side to the ball.""",
-    "without-kicks": "`without-kicks` shows none beside the batches.",
-    "plain": """`plain` knows of no plan, and the other players as lists of the nearest; it is trained by Adam on
-samples as they are, without kicks beside the batches.""",
+    "without-plan": "`without-plan` has no block `plan`.",
+    "plan-of-kicks": "`plan-of-kicks` gives it to the kick layers only.",
+    "without-attention": """In `without-attention` the kick layers get, of the other players, only the plan and the two
+of each side that are nearest to the ball.""",
+    "without-kicks": "`without-kicks` shows no extra kicks beside the batches.",
+    "plain": """`plain` has no plan and gets the other players as lists of the nearest; it is trained by Adam, without
+mirrored samples and without extra kicks.""",
 }
 
 
@@ -354,7 +357,7 @@ def _kicks(results: Results, variants: Mapping[str, Sequence[str]]) -> str:
     )
     return f"""## Kicks
 
-Where kicks go, and how hard, by what is known of plans with the ball, of the other players, and by how often kicks are
+Errors of kicks, by what the network gets of plans with the ball and of the other players, and by how often kicks are
 shown. {" ".join(KICKS_TEXT[name] for name in made if name in KICKS_TEXT)}
 
 {table(headers, rows)}"""
@@ -414,7 +417,7 @@ def _variants(
         spans = [np.ptp([value(entropy(result["sets"][item]["all"])) for result in seeds(results)]) for item in names]
         noise = (
             "\n\nOne seed each. The cross-entropies of the seeds of `best` lie "
-            f"{' / '.join(number(float(span), 4) for span in spans)} nats apart: smaller changes say nothing."
+            f"{' / '.join(number(float(span), 4) for span in spans)} nats apart: smaller changes are within that."
         )
     return f"## {heading}\n\n{text}{noise}\n\n{table([*headers, 'minutes'], rows)}"
 
@@ -442,15 +445,16 @@ def _curve(curve: Mapping[str, Any], results: Results, *, plot: str) -> str:
     headers = ("set", "floor, nats", "without any one point", "exponent", "twice the matches", "ten times")
     return f"""## Learning curve
 
-`plain`, see above; an epoch goes through few matches more than once (`data.repeat`). Every smaller set of matches is a
-part of the larger ones.
+`plain`, see above; with few matches an epoch makes several passes (`data.repeat`). Every smaller set of matches is a
+subset of the larger ones.
 
 ![Cross-entropy by training matches]({plot})
 
 {table(("training matches", "cross-entropy", "accuracy", "minutes"), rows)}
 
-A power law that falls to a floor, `floor + scale * matches ^ -exponent`, fitted by least squares. The floor is what
-more matches alone would leave; from so few points it is a rough guess, as the fits without any one point show.
+A power law that falls to a floor, `floor + scale * matches ^ -exponent`, fitted by least squares. The floor is the
+estimated cross-entropy with unlimited matches. From so few points it is a rough estimate, as the fits without any one
+point show.
 
 {table(headers, fits)}"""
 
@@ -473,18 +477,18 @@ def _plans(left: Mapping[str, Any]) -> str:
         for name, row in left["choices"].items()
     ]
     headers = ("set", "kicks", "as planned", "one of the ways planned", "as `best-0` says")
-    return f"""What [plans](train.md#what-the-preset-best-trains) by the rules of HELIOS Base say by themselves:
-kicks that give the ball the very velocity that was planned, to four millimetres per cycle; that of any way there was;
-and the one that `best-0` answers with.
+    return f"""What [plans](network.md#plans-with-the-ball) by the rules of HELIOS Base predict by themselves: the
+share of kicks that give the ball the planned velocity, to four millimetres per cycle; the velocity of any planned
+candidate; and the one that `best-0` gives as its answer.
 
 {table(headers, kicks)}
 
-Tackles in the direction, one of 40, that was planned, and in the one that `best-0` says.
+Tackles in the planned direction, one of 40, and in the one that `best-0` gives.
 
 {table(("set", "tackles", "as planned", "as `best-0` says"), tackles)}
 
-Of all commands of those who can kick the ball, by what is planned, what was given. Who goes on with what he planned
-before dashes or turns; a log does not tell.
+Commands of players who can kick the ball, by the planned action. A player that continues an earlier plan dashes or
+turns; the log does not show this.
 
 {table(("planned", "commands", "kick as planned", "another kick", "dash", "turn", "tackle"), done)}"""
 
@@ -525,10 +529,10 @@ def _left(left: Mapping[str, Any], results: Results, *, situations: Sequence[str
     return f"""## What is left
 
 Errors of {left["seeds"]} seeds of `best`. Systematic: all seeds make the error and are
-{100 * sure:.0f} % sure of it on average, so the inputs lack what decides, or the agent acted on something that is not
-in the log (its noisy sight, its memory). Shared, unsure: all make it and know that they may. By seed: only some make
-it, which more training data or an ensemble can mend. The entropy is what a calibrated model expects of its own
-cross-entropy; the part on which the seeds agree is chance as far as these inputs tell, the rest is doubt about the
+{100 * sure:.0f} % sure of it on average, so the inputs lack the cause, or the agent acted on something that is not in
+the log (its noisy sight, its memory). Shared, unsure: all make it with low confidence. By seed: only some make it,
+which more training data or an ensemble can correct. The entropy is what a calibrated model expects of its own
+cross-entropy; the part on which the seeds agree is randomness given these inputs, the rest is uncertainty about the
 weights.
 
 {
@@ -542,7 +546,7 @@ The mean of the probabilities of all seeds; in brackets a single seed.
 
 {table(("set", "accuracy", "cross-entropy", "ECE"), ensemble)}
 
-Where the errors are. The ball is taken to roll on freely to tell who has it first.
+Errors by situation. To find the first player at the ball, the ball is assumed to roll on freely.
 
 {table(("set", "situation", "rows", "share", "errors", "cross-entropy", "of all errors", "of all nats"), where)}"""
 
@@ -551,7 +555,8 @@ def _reproduce(results: Results, commands: Sequence[str]) -> str:
     text = "## Reproduce\n\n```sh\nmake fidelity MATCHES=folder\n```"
     if commands:
         listing = "\n".join(commands)
-        text += f"\n\nwhich is, beside the measuring, with the logs in `MATCHES`:\n\n```\n{listing}\n```"
+        text += "\n\nruns these commands, and the measurements between them, with the logs in `MATCHES`:"
+        text += f"\n\n```\n{listing}\n```"
     if results:
         text += "\n\n" + machines(result["machine"] for result in results.values())
     return text

@@ -1,6 +1,6 @@
 """Clones of several teams, one clone of them all, and how it adapts to a team that it never played as.
 
-    python benchmarks/teams.py MATCHES --out DIR [--teams A B C] [--new NAME] [--page docs/teams.md]
+    python benchmarks/teams.py MATCHES --out DIR [--teams A B C] [--new NAME] [--page docs/explanation/teams.md]
 
 MATCHES is a folder of logs. Each of the teams gets a dataset and a clone of its own by preset best, split by whole
 match, and so do all of them together: the base. `adapting.py` then adapts the base to the new team, whose test matches
@@ -136,13 +136,15 @@ def page(work: Work, clones: Mapping[str, Mapping[str, Any]], adapted: Mapping[s
     parts = [
         "# Several teams",
         f"""Clones of {len(work.options.teams)} teams, one clone of them all, and how that one adapts to a team that it
-never played as. `python benchmarks/teams.py MATCHES --out DIR --page docs/teams.md` makes all and writes this page.""",
+was not trained on. `python benchmarks/teams.py MATCHES --out DIR --page docs/explanation/teams.md` makes all and
+writes this page.""",
         "## A clone for each team",
         f"""Preset `best`{settings}; whole matches for training, validation or test. Samples are those of an epoch. A
 match of two of these teams counts twice for the clone of them all, seen from either side.""",
         table(HEADERS, [figures_of(name, clone) for name, clone in clones.items()]),
         "## Few matches of a new team",
-        f"""The clone of them all, adapted to {new} ([adapt](adapt.md)) with some matches, beside a fresh network of the
+        f"""The clone of them all, adapted to {new} ([adapt](../reference/commands/adapt.md)) with some matches,
+beside a fresh network of the
 same form that goes through as many batches, on {adapted["environment"]["threads"]} threads; both are tested on
 {len(adapted["matches"])} matches of {adapted["rows"]:,} commands. {seen}""",
         table(("training matches", "samples", "adapted, s", *OF_TWO, "fresh, s", *OF_TWO), rows),

@@ -26,7 +26,7 @@ def strays(folder: Path) -> list[str]:
     return found
 
 
-def write_plan(
+def write_schedule(
     folder: Path,
     pairings: list[tuple[str, str]],
     *,
@@ -38,12 +38,12 @@ def write_plan(
     limits: str = "connect_s = 20",
     more: str = "",
 ) -> Path:
-    """A plan of short matches; ``teams`` maps names to commands or to whole tables, others are sound."""
+    """A schedule of short matches; ``teams`` maps names to commands or to whole tables, others are sound."""
     names = dict.fromkeys(name for pairing in pairings for name in pairing)
     tables = dict.fromkeys(names, f"command = '''{TEAM}'''")
     for name, text in (teams or {}).items():
         tables[name] = text if text.lstrip().startswith(("start", "player")) else f"command = '''{text}'''"
-    path = folder / "plan.toml"
+    path = folder / "schedule.toml"
     path.write_text(
         f"[server]\ncommand = '{server}'\n"
         f"options = {{ half_time = {half_time}, kick_off_wait = 5, game_over_wait = 5 }}\n"
@@ -57,7 +57,7 @@ def write_plan(
     return path
 
 
-def started(plan: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
-    command = [str(TEAMCLONE), "play", str(plan), "--out", str(out), *options]
+def started(schedule: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
+    command = [str(TEAMCLONE), "play", str(schedule), "--out", str(out), *options]
     quiet = subprocess.DEVNULL
     return subprocess.Popen(command, stdout=quiet, stderr=quiet, start_new_session=True)

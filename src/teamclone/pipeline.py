@@ -1,4 +1,4 @@
-"""All of it from one plan: play, store, dataset, training, evaluation, report. What is there and still fits is kept."""
+"""From one schedule to the report: play, store, dataset, train, evaluate. What is there and still fits is kept."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from teamclone.evaluation.evaluate import evaluate, save_evaluation
 from teamclone.evaluation.report import fresh_evaluation, make_report
 from teamclone.play.record import Record
 from teamclone.play.runner import PlayReport, play
-from teamclone.play.schedule import Plan, folder_of, plan_from, read_plan
+from teamclone.play.schedule import Schedule, folder_of, read_schedule, schedule_from
 from teamclone.play.server import find_server
 from teamclone.store import create_store
 from teamclone.system.settings import fill
@@ -26,7 +26,7 @@ from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, is_run, open_run
 
 STORE, DATASET, RUN = "store", "dataset", "run"
-"""Folders of a plan's folder, beside those of `play`."""
+"""Folders beside those that `play` makes."""
 MAX_SHARE = 0.9
 """Of the matches, for test or validation."""
 
@@ -65,9 +65,9 @@ class EvaluateSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pipeline:
-    """A plan with all its sections. Without a dataset it ends with the store, without training with the dataset."""
+    """A schedule with all its sections. Without a dataset it ends with the store, without training with the dataset."""
 
-    plan: Plan
+    schedule: Schedule
     store: str
     dataset: DatasetConfig | None
     train: Config | None
@@ -86,24 +86,25 @@ class StageResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """Who is told what goes on: the steps of a stage, what became of matches, the progress of training."""
+    """What is called while it goes on: with the steps of a stage, the records of matches, the progress of training."""
 
     on_progress: Callable[[Stage, int, int], None] = lambda stage, done, total: None
     on_record: Callable[[Record], None] = lambda record: None
     on_training: Callable[[Progress], None] = lambda progress: None
 
     def steps(self, stage: Stage) -> Callable[[int, int], None]:
+        """Return what a stage calls with how many of its steps are done, and how many there are."""
         return lambda done, total: self.on_progress(stage, done, total)
 
 
 def load_pipeline(path: Path) -> Pipeline:
-    """A plan with its sections ``store``, ``dataset``, ``train`` and ``evaluate``.
+    """Read a schedule with its sections ``store``, ``dataset``, ``train`` and ``evaluate``.
 
     Raises:
         UsageError: naming what is wrong, in one line.
     """
-    table = read_plan(path)
-    plan = plan_from(table, where=str(path), base=folder_of(path))
+    table = read_schedule(path)
+    schedule = schedule_from(table, where=str(path), base=folder_of(path))
     problems: list[str] = []
     store = fill(StoreSettings, table.get("store", {}), "store", problems)
     training = fill(TrainSettings, table.get("train", {}), "train", problems)
@@ -139,7 +140,7 @@ def load_pipeline(path: Path) -> Pipeline:
     if location and "://" not in location:
         location = str(folder_of(path) / Path(location).expanduser())
     return Pipeline(
-        plan=plan,
+        schedule=schedule,
         store=location,
         dataset=config,
         train=trained,
@@ -158,12 +159,17 @@ def run_pipeline(
     """Do what is missing, stage by stage. Stopped or killed, the next call goes on where this one was.
 
     Args:
-        out: as of `play.play`; store, dataset and run lie beside the matches.
-        executor: where matches are played and cleaned.
+        out: where the matches go, as in `play.runner.play`; store, dataset and run lie beside them.
+        executor: where matches are played and cleaned; None is this machine.
+        jobs: how many at once, as in `play.runner.play`.
+        watch: called while it goes on.
+
+    Returns:
+        What became of the matches, and of each stage that there was.
 
     Raises:
-        PlayError: as of `play.play`, or no match at all is complete.
-        TeamcloneError: of the stage that failed; what the stages before made stays.
+        PlayError: as `play.runner.play` does, or no match at all is complete.
+        TeamcloneError: a stage failed; what the stages before made stays.
     """
     results: list[StageResult] = []
     started = time.monotonic()
@@ -176,10 +182,10 @@ def run_pipeline(
 
     out = out.resolve()
     if executor is None:
-        find_server(pipeline.plan.fixtures[0].server)  # before anything is made
+        find_server(pipeline.schedule.fixtures[0].server)  # before anything is made
     store = create_store(pipeline.store or str(out / STORE))
     report = play(
-        pipeline.plan,
+        pipeline.schedule,
         out,
         store=store,
         executor=executor,
@@ -191,7 +197,7 @@ def run_pipeline(
     text = f"{complete} matches in {store.location}, {len(report.failed)} failed"
     tell(Stage.PLAY, text, done=report.played > 0)
     if not complete:
-        raise PlayError(f"{out}: no match of the plan is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]
+        raise PlayError(f"{out}: no match of the schedule is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]
     if pipeline.dataset is None:
         return report, results
 
@@ -207,32 +213,21 @@ def run_pipeline(
             replace=folder.exists(),
             on_progress=watch.steps(Stage.DATASET),
         )
-    dataset = open_dataset(folder)
-    text = f"{dataset.meta['n_samples']:,} samples in {folder}"
-    tell(Stage.DATASET, text, done=not current)
+    tell(Stage.DATASET, f"{open_dataset(folder).meta['n_samples']:,} samples in {folder}", done=not current)
     if pipeline.train is None:
         return report, results
 
     run, trained = _train(pipeline.train, folder, out / RUN, watch)
     tell(Stage.TRAIN, f"{len(run.history())} epochs in {run.path}", done=trained)
-
-    evaluation = fresh_evaluation(run)
-    fresh = evaluation is not None and evaluation["run"]["checkpoint"] == pipeline.checkpoint
-    if not fresh:
-        steps = watch.steps(Stage.EVALUATE)
-        save_evaluation(run, evaluate(run, checkpoint=pipeline.checkpoint, on_progress=steps))
-    tell(Stage.EVALUATE, f"{run.path}/evaluation.json", done=not fresh)
-
-    page = run.path / "report.html"
-    there = fresh and page.exists() and page.stat().st_mtime_ns >= (run.path / "evaluation.json").stat().st_mtime_ns
-    if not there:
-        make_report(run, on_progress=lambda _, done, total: watch.on_progress(Stage.REPORT, done, total))
-    tell(Stage.REPORT, str(page), done=not there)
+    evaluated = _evaluate(run, pipeline.checkpoint, watch)
+    tell(Stage.EVALUATE, f"{run.path}/evaluation.json", done=evaluated)
+    page, written = _report(run, watch, anew=evaluated)
+    tell(Stage.REPORT, str(page), done=written)
     return report, results
 
 
 def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> tuple[Run, bool]:
-    """The trained run, gone on with or made; and whether there was anything to do."""
+    """Train, or go on with it: the run, and whether there was anything to do."""
     dataset = open_dataset(dataset_folder)
     resume = False
     if is_run(folder):
@@ -245,3 +240,22 @@ def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> 
         else:
             resume = True
     return train(config, dataset, folder, resume=resume, on_progress=watch.on_training), True
+
+
+def _evaluate(run: Run, checkpoint: str, watch: Watch) -> bool:
+    """Evaluate these weights; whether there was anything to do."""
+    evaluation = fresh_evaluation(run)
+    if evaluation is not None and evaluation["run"]["checkpoint"] == checkpoint:
+        return False
+    save_evaluation(run, evaluate(run, checkpoint=checkpoint, on_progress=watch.steps(Stage.EVALUATE)))
+    return True
+
+
+def _report(run: Run, watch: Watch, *, anew: bool) -> tuple[Path, bool]:
+    """Write the report unless one is younger than the evaluation: its page, and whether there was anything to do."""
+    page = run.path / "report.html"
+    evaluated_ns = (run.path / "evaluation.json").stat().st_mtime_ns
+    if not anew and page.exists() and page.stat().st_mtime_ns >= evaluated_ns:
+        return page, False
+    make_report(run, on_progress=lambda _, done, total: watch.on_progress(Stage.REPORT, done, total))
+    return page, True

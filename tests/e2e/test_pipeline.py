@@ -55,7 +55,7 @@ def test_the_dataset_splits_by_whole_match(work: Path) -> None:
         by_split[match["split"]] = by_split.get(match["split"], 0) + sum(match["rows"].values())
     assert by_split == {split: sum(rows.values()) for split, rows in report["rows"].items()}
     assert sum(by_split.values()) == report["rules"][-1]["after"]
-    # Counted apart from teamclone, by the rules of docs/dataset.md, on these matches.
+    # Counted apart from teamclone, by the rules of docs/reference/commands/dataset.md, on these matches.
     received = next(rule["before"] for rule in report["rules"] if rule["name"] == "executed by the server")
     assert report["rules"][-1]["after"] / received > 0.999
 

@@ -244,12 +244,12 @@ def test_the_command(
 def test_the_example_of_the_page_runs(
     base: Run, team: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "adapt.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "commands" / "adapt.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     shutil.copytree(base.path, tmp_path / "BASE")
     shutil.copytree(team.path, tmp_path / "DS")
     with chdir(tmp_path):
-        exec(compile(code, "docs/adapt.md", "exec"), {})
+        exec(compile(code, "docs/reference/commands/adapt.md", "exec"), {})
     assert 0 <= float(capsys.readouterr().out) <= 1
     listed = dict(re.findall(r"^\| `((?:data|train)\.\w+)` \| `([^`]+)` \|", page, re.MULTILINE))
     assert listed.keys() == {text.partition("=")[0] for text in SETTINGS}

@@ -242,7 +242,7 @@ def test_every_option_is_documented(name: str) -> None:
     from teamclone.cli.app import app
     from teamclone.store.checks import CHECKS
 
-    page = (Path(__file__).resolve().parents[2] / "docs" / f"{name}.md").read_text()
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "commands" / f"{name}.md").read_text()
     command = get_command(app).commands[name]  # type: ignore[attr-defined]
     for parameter in command.params:
         for option in parameter.opts:

@@ -18,10 +18,10 @@ from typing import Any
 import pytest
 
 from command import TEAMCLONE, teamclone
-from playing import strays, write_plan
+from playing import strays, write_schedule
 from teamclone.errors import UsageError
 from teamclone.play.runner import _play_match, _Task
-from teamclone.play.schedule import load_plan
+from teamclone.play.schedule import load_schedule
 from teamclone.store import create_store, ingest, open_store
 from teamclone.system.cluster import executor_of
 
@@ -212,9 +212,9 @@ def test_a_worker_that_does_not_see_the_logs(fixtures_dir: Path, tmp_path: Path)
 
 def test_matches_are_played_on_a_cluster_and_a_killed_worker_costs_none(cluster: Cluster, tmp_path: Path) -> None:
     out, pairings = tmp_path / "out", [("Red", "Blue"), ("Blue", "Red")]
-    plan = write_plan(tmp_path, pairings, half_time=30, attempts=1)
+    schedule = write_schedule(tmp_path, pairings, half_time=30, attempts=1)
     process = start(
-        "play", plan, "--out", out, "--scheduler", cluster.address, "--ingest", tmp_path / "store", "--json"
+        "play", schedule, "--out", out, "--scheduler", cluster.address, "--ingest", tmp_path / "store", "--json"
     )
     try:
         wait_for(lambda: len(list(out.glob(".playing/*/*/output/right-team.txt"))) == 2, "match on each worker")
@@ -230,8 +230,8 @@ def test_matches_are_played_on_a_cluster_and_a_killed_worker_costs_none(cluster:
 
 def test_ctrl_c_ends_the_matches_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    plan = write_plan(tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300)
-    process = start("play", plan, "--out", out, "--scheduler", cluster.address)
+    schedule = write_schedule(tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300)
+    process = start("play", schedule, "--out", out, "--scheduler", cluster.address)
     try:
         wait_for(lambda: len(list(out.glob(".playing/*/*/output/right-team.txt"))) == 2, "match on each worker")
         process.send_signal(signal.SIGINT)
@@ -246,7 +246,7 @@ def test_ctrl_c_ends_the_matches_on_a_cluster(cluster: Cluster, tmp_path: Path) 
 def test_a_folder_that_workers_do_not_see_is_told(cluster: Cluster, tmp_path: Path) -> None:
     """The workers' view of the folder is taken away by asking for the match without it."""
     task = _Task(
-        fixture=load_plan(write_plan(tmp_path, [("Red", "Blue")])).fixtures[0],
+        fixture=load_schedule(write_schedule(tmp_path, [("Red", "Blue")])).fixtures[0],
         attempts=1,
         out=tmp_path / "elsewhere",
         wanted=tmp_path / "elsewhere" / "wanted",

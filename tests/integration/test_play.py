@@ -1,4 +1,4 @@
-"""`teamclone play` and `teamclone run` with servers and teams as processes: a stand-in, and the real server.
+"""`teamclone play` and `teamclone pipeline` with servers and teams as processes: a stand-in, and the real server.
 
 The stand-in (tests/standin) speaks the protocol and writes the logs, its teams cannot play but crash and hang on
 demand. They play on the real rcssserver, too: where one is on the PATH, tests with the marker ``rcssserver`` run.
@@ -23,12 +23,12 @@ import pytest
 
 from command import teamclone
 from disk import small_disk
-from playing import STANDIN, TEAM, started, strays, write_plan
+from playing import STANDIN, TEAM, started, strays, write_schedule
 from teamclone.errors import UsageError
 from teamclone.logs import read_match
 from teamclone.play.record import NAME
 from teamclone.play.runner import _attempt
-from teamclone.play.schedule import load_plan
+from teamclone.play.schedule import load_schedule
 from teamclone.play.supervisor import Order
 from teamclone.store import open_store
 
@@ -54,15 +54,15 @@ def _nothing_stays(tmp_path: Path) -> Iterator[None]:
     assert strays(tmp_path) == []
 
 
-def play(plan: Path, out: Path, *options: object, code: int = 0) -> dict[str, Any]:
-    done = teamclone("play", plan, "--out", out, "--json", *options, code=code)
+def play(schedule: Path, out: Path, *options: object, code: int = 0) -> dict[str, Any]:
+    done = teamclone("play", schedule, "--out", out, "--json", *options, code=code)
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer
 
 
-def one(plan: Path, out: Path, *options: object) -> dict[str, Any]:
+def one(schedule: Path, out: Path, *options: object) -> dict[str, Any]:
     """The trouble of a match that fails."""
-    answer = play(plan, out, *options, code=1)
+    answer = play(schedule, out, *options, code=1)
     [record] = answer["records"]
     trouble: dict[str, Any] = record["trouble"]
     return trouble
@@ -71,10 +71,10 @@ def one(plan: Path, out: Path, *options: object) -> dict[str, Any]:
 @both_servers
 def test_a_match_is_whole_with_its_logs_and_all_that_is_known_of_it(tmp_path: Path, server: str) -> None:
     out = tmp_path / "out"
-    plan = write_plan(
+    schedule = write_schedule(
         tmp_path, [("Red", "Blue")], server=server, teams={"Red": f"{TEAM} --olcoach-port {{olcoach_port}}"}
     )
-    answer = play(plan, out, "--ingest", tmp_path / "store")
+    answer = play(schedule, out, "--ingest", tmp_path / "store")
     assert (answer["matches"], answer["complete"], answer["failed"], answer["played"]) == (1, 1, 0, 1)
     home = out / "matches" / "Red-vs-Blue-1"
     record = json.loads((home / NAME).read_text())
@@ -102,14 +102,14 @@ def test_a_match_is_whole_with_its_logs_and_all_that_is_known_of_it(tmp_path: Pa
     assert {path.name for path in home.iterdir()} == {NAME, "output", *record["logs"]}
     assert {path.name for path in out.iterdir()} == {"matches", "failed", ".lock"}
 
-    again = play(plan, out)
+    again = play(schedule, out)
     assert again["played"] == 0
     assert again["records"] == answer["records"]
 
 
 def test_holes_and_clashes_are_counted_for_each_player(tmp_path: Path) -> None:
     teams = {"Red": f"{TEAM} --hole-every 4", "Blue": f"{TEAM} --clash-every 5"}
-    [record] = play(write_plan(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out")["records"]
+    [record] = play(write_schedule(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out")["records"]
     assert all(8 <= count <= 10 for count in record["left"]["holes"])
     assert record["left"]["clashes"] == [0] * 11
     assert all(6 <= count <= 8 for count in record["right"]["clashes"])
@@ -123,8 +123,10 @@ def test_holes_and_clashes_are_counted_for_each_player(tmp_path: Path) -> None:
 def test_a_team_that_crashes_is_told_with_its_players(
     tmp_path: Path, server: str, options: str, unums: tuple[int, ...]
 ) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue")], server=server, half_time=30, teams={"Blue": f"{TEAM} {options}"})
-    trouble = one(plan, tmp_path / "out")
+    schedule = write_schedule(
+        tmp_path, [("Red", "Blue")], server=server, half_time=30, teams={"Blue": f"{TEAM} {options}"}
+    )
+    trouble = one(schedule, tmp_path / "out")
     assert (trouble["fault"], trouble["side"]) == ("crashed", "right")
     assert tuple(trouble["unums"]) == unums
     assert trouble["cycle"] >= 12
@@ -135,10 +137,10 @@ def test_a_team_that_crashes_is_told_with_its_players(
 
 @both_servers
 def test_a_team_that_never_comes_is_given_up(tmp_path: Path, server: str) -> None:
-    plan = write_plan(
+    schedule = write_schedule(
         tmp_path, [("Late", "Red")], server=server, limits="connect_s = 1", teams={"Late": f"{TEAM} --never-connect"}
     )
-    trouble = one(plan, tmp_path / "out")
+    trouble = one(schedule, tmp_path / "out")
     assert (trouble["fault"], trouble["side"], trouble["cycle"]) == ("never connected", "left", 0)
     assert "Late: 0 of 11 players connected within 1 s" in trouble["text"]
 
@@ -152,7 +154,9 @@ def test_a_team_that_never_comes_is_given_up(tmp_path: Path, server: str) -> Non
     ],
 )
 def test_a_team_that_does_not_start_is_told_with_its_last_words(tmp_path: Path, command: str, words: str) -> None:
-    trouble = one(write_plan(tmp_path, [("Red", "Bad")], teams={"Bad": command.replace("'", '"')}), tmp_path / "out")
+    trouble = one(
+        write_schedule(tmp_path, [("Red", "Bad")], teams={"Bad": command.replace("'", '"')}), tmp_path / "out"
+    )
     assert (trouble["fault"], trouble["side"]) == ("team did not start", "right")
     assert words in trouble["text"]
 
@@ -160,8 +164,10 @@ def test_a_team_that_does_not_start_is_told_with_its_last_words(tmp_path: Path, 
 @both_servers
 def test_a_client_that_hangs_is_found(tmp_path: Path, server: str) -> None:
     """In synchronous mode the server gives up on it, and the command log says who it was."""
-    plan = write_plan(tmp_path, [("Red", "Blue")], server=server, half_time=20, teams={"Red": f"{TEAM} --hang-at 30"})
-    trouble = one(plan, tmp_path / "out")
+    schedule = write_schedule(
+        tmp_path, [("Red", "Blue")], server=server, half_time=20, teams={"Red": f"{TEAM} --hang-at 30"}
+    )
+    trouble = one(schedule, tmp_path / "out")
     assert (trouble["fault"], trouble["side"]) == ("hung", "left")
     assert trouble["unums"] == list(range(1, 12))
 
@@ -178,28 +184,28 @@ def test_a_server_that_ends_or_stalls_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, fault: str, words: str
 ) -> None:
     monkeypatch.setenv(variable, "15")
-    trouble = one(write_plan(tmp_path, [("Red", "Blue")], limits="stall_s = 2"), tmp_path / "out")
+    trouble = one(write_schedule(tmp_path, [("Red", "Blue")], limits="stall_s = 2"), tmp_path / "out")
     assert (trouble["fault"], trouble["side"]) == (fault, None)
     assert words in trouble["text"]
 
 
 def test_a_match_over_its_time_is_ended(tmp_path: Path) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue")], half_time=300, limits="match_s = 4")
-    assert one(plan, tmp_path / "out")["fault"] == "took too long"
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], half_time=300, limits="match_s = 4")
+    assert one(schedule, tmp_path / "out")["fault"] == "took too long"
 
 
 @both_servers
 def test_a_wrong_option_is_told_in_the_server_s_words(tmp_path: Path, server: str) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue")], server=server)
-    plan.write_text(plan.read_text().replace("kick_off_wait", "kick_of_wait"))
-    trouble = one(plan, tmp_path / "out")
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], server=server)
+    schedule.write_text(schedule.read_text().replace("kick_off_wait", "kick_of_wait"))
+    trouble = one(schedule, tmp_path / "out")
     assert trouble["fault"] == "server did not start"
     assert "kick_of_wait" in trouble["text"]
 
 
 def test_without_a_server_nothing_is_begun(tmp_path: Path) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue")], server="no-such-server")
-    done = teamclone("play", plan, "--out", tmp_path / "out", code=1)
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], server="no-such-server")
+    done = teamclone("play", schedule, "--out", tmp_path / "out", code=1)
     assert "no-such-server: no such program on the PATH; install rcssserver" in done.stderr
     assert not (tmp_path / "out").exists()
 
@@ -207,8 +213,8 @@ def test_without_a_server_nothing_is_begun(tmp_path: Path) -> None:
 @both_servers
 def test_league_scripts_share_the_default_port_one_match_after_the_other(tmp_path: Path, server: str) -> None:
     script = f"start = '{STANDIN}/start'\nenvironment = {{ TEAM_NAME = '{{team}}' }}"
-    plan = write_plan(tmp_path, [("Red", "Blue")], server=server, teams={"Red": script}, matches=2)
-    records = play(plan, tmp_path / "out", "-j", 2)["records"]
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], server=server, teams={"Red": script}, matches=2)
+    records = play(schedule, tmp_path / "out", "-j", 2)["records"]
     assert [record["ports"] for record in records] == [[6000, 6001, 6002]] * 2
     assert all(record["outcome"] == "complete" for record in records)
     assert all(len(record["commands"]) == 1 + 12 + 1 for record in records)
@@ -216,13 +222,13 @@ def test_league_scripts_share_the_default_port_one_match_after_the_other(tmp_pat
 
 def test_a_default_port_that_a_stranger_has_is_told(tmp_path: Path) -> None:
     script = f"start = '{STANDIN}/start'"
-    plan = write_plan(tmp_path, [("Red", "Blue")], teams={"Red": script})
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], teams={"Red": script})
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         try:
             stranger.bind(("", 6001))
         except OSError:
             pytest.skip("port 6001 is in use on this machine")
-        trouble = one(plan, tmp_path / "out")
+        trouble = one(schedule, tmp_path / "out")
     assert trouble["fault"] == "no port"
     assert "teams without {port} in their commands need 6000" in trouble["text"]
 
@@ -231,52 +237,54 @@ def test_a_default_port_that_a_stranger_has_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("crash", [False, True])
 def test_nothing_stays_of_teams_with_bad_habits(tmp_path: Path, habit: str, crash: bool) -> None:
     teams = {"Red": f"{TEAM} {habit}", "Blue": f"{TEAM} {'--crash-at 10' if crash else ''}"}
-    answer = play(write_plan(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out", code=int(crash))
+    answer = play(write_schedule(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out", code=int(crash))
     assert answer["failed"] == int(crash)
     assert strays(tmp_path) == []
 
 
 def test_a_match_is_tried_again_and_failures_are_remembered(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    plan = write_plan(tmp_path, [("Red", "Blue")], attempts=3, teams={"Blue": f"{TEAM} --crash-at 5"})
-    [record] = play(plan, out, code=1)["records"]
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], attempts=3, teams={"Blue": f"{TEAM} --crash-at 5"})
+    [record] = play(schedule, out, code=1)["records"]
     assert record["attempt"] == 3
     assert sorted(path.name for path in (out / "failed" / "Red-vs-Blue-1").iterdir()) == ["1", "2", "3"]
-    assert play(plan, out, code=1)["played"] == 0
-    assert play(plan, out, "--retry-failed", code=1)["played"] == 1
+    assert play(schedule, out, code=1)["played"] == 0
+    assert play(schedule, out, "--retry-failed", code=1)["played"] == 1
 
 
 def test_a_match_that_comes_off_at_the_second_attempt_counts(tmp_path: Path) -> None:
     once = f"sh -c 'if mkdir {tmp_path}/once 2>/dev/null; then exit 1; fi; exec {TEAM}'".replace("'", '"')
-    [record] = play(write_plan(tmp_path, [("Red", "Blue")], attempts=2, teams={"Red": once}), tmp_path / "out")[
+    [record] = play(write_schedule(tmp_path, [("Red", "Blue")], attempts=2, teams={"Red": once}), tmp_path / "out")[
         "records"
     ]
     assert (record["outcome"], record["attempt"]) == ("complete", 2)
     assert (tmp_path / "out" / "failed" / "Red-vs-Blue-1" / "1" / NAME).is_file()
 
 
-def test_a_changed_plan_is_not_mixed_with_what_was_played(tmp_path: Path) -> None:
-    play(write_plan(tmp_path, [("Red", "Blue")]), tmp_path / "out")
-    play(write_plan(tmp_path, [("Red", "Blue")], matches=2), tmp_path / "out")  # more matches are welcome
-    done = teamclone("play", write_plan(tmp_path, [("Red", "Blue")], half_time=3), "--out", tmp_path / "out", code=2)
+def test_a_changed_schedule_is_not_mixed_with_what_was_played(tmp_path: Path) -> None:
+    play(write_schedule(tmp_path, [("Red", "Blue")]), tmp_path / "out")
+    play(write_schedule(tmp_path, [("Red", "Blue")], matches=2), tmp_path / "out")  # more matches are welcome
+    done = teamclone(
+        "play", write_schedule(tmp_path, [("Red", "Blue")], half_time=3), "--out", tmp_path / "out", code=2
+    )
     assert "Red-vs-Blue-1: was played in" in done.stderr
 
 
-def test_the_quick_case_needs_no_plan(tmp_path: Path) -> None:
+def test_the_quick_case_needs_no_schedule(tmp_path: Path) -> None:
     red, blue = (TEAM.replace("{team}", name) for name in ("Red", "Blue"))
     server = ("--server", STANDIN / "rcssserver", "--set", "half_time=2", "--set", "kick_off_wait=5")
     done = teamclone("play", "--left", red, "--right", blue, "-n", 2, *server, "--out", tmp_path / "out")
     assert "matches: 2 complete, 0 failed, 2 played now" in done.stdout
     assert "left : right" in done.stdout
-    for wrong in (("--left", red), (tmp_path / "plan.toml", "--left", red), ()):
+    for wrong in (("--left", red), (tmp_path / "schedule.toml", "--left", red), ()):
         teamclone("play", *wrong, "--out", tmp_path / "out", code=2)
 
 
 def test_another_process_is_not_disturbed(tmp_path: Path) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue")], half_time=300)
-    first = started(plan, tmp_path / "out")
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], half_time=300)
+    first = started(schedule, tmp_path / "out")
     wait_for_match(tmp_path / "out")
-    done = teamclone("play", plan, "--out", tmp_path / "out", code=1)
+    done = teamclone("play", schedule, "--out", tmp_path / "out", code=1)
     assert "another process plays into it" in done.stderr
     first.send_signal(signal.SIGINT)
     assert first.wait(20) == 130
@@ -284,8 +292,10 @@ def test_another_process_is_not_disturbed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_whoever_ends_it_ends_its_processes(tmp_path: Path, number: signal.Signals) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300, teams={"Red": f"{TEAM} --fork"})
-    process = started(plan, tmp_path / "out", "-j", "2")
+    schedule = write_schedule(
+        tmp_path, [("Red", "Blue"), ("Blue", "Red")], half_time=300, teams={"Red": f"{TEAM} --fork"}
+    )
+    process = started(schedule, tmp_path / "out", "-j", "2")
     wait_for_match(tmp_path / "out", number=2)
     process.send_signal(number)
     assert process.wait(20) == (130 if number == signal.SIGINT else -number)
@@ -297,32 +307,32 @@ def test_whoever_ends_it_ends_its_processes(tmp_path: Path, number: signal.Signa
     assert not list((tmp_path / "out" / "failed").iterdir())
 
 
-def test_a_killed_keeper_costs_an_attempt(tmp_path: Path) -> None:
+def test_a_killed_supervisor_costs_an_attempt(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    plan = write_plan(tmp_path, [("Red", "Blue")], attempts=2, half_time=60, teams={"Red": f"{TEAM} --fork"})
-    process = started(plan, out)
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], attempts=2, half_time=60, teams={"Red": f"{TEAM} --fork"})
+    process = started(schedule, out)
     wait_for_match(out)
-    [keeper] = [
+    [supervisor] = [
         child for child in psutil.Process(process.pid).children() if "teamclone.play.supervisor" in child.cmdline()
     ]
-    keeper.kill()
+    supervisor.kill()
     assert process.wait(100) == 0
     record = json.loads((out / "matches" / "Red-vs-Blue-1" / NAME).read_text())
     assert (record["outcome"], record["attempt"]) == ("complete", 2)
     failed = json.loads((out / "failed" / "Red-vs-Blue-1" / "1" / NAME).read_text())
-    assert failed["trouble"]["fault"] == "keeper died"
+    assert failed["trouble"]["fault"] == "supervisor died"
 
 
 def test_a_full_disk_stops_all_and_nothing_is_lost(tmp_path: Path) -> None:
     with small_disk(tmp_path / "disk", kilobytes=34_000) as disk:
         out = disk / "out"
-        assert play(write_plan(tmp_path, [("Red", "Blue")]), out)["complete"] == 1
-        plan = write_plan(tmp_path, [("Red", "Blue")], matches=2)
+        assert play(write_schedule(tmp_path, [("Red", "Blue")]), out)["complete"] == 1
+        schedule = write_schedule(tmp_path, [("Red", "Blue")], matches=2)
         (disk / "ballast").write_bytes(bytes(8_000_000))
-        done = teamclone("play", plan, "--out", out, code=1)
+        done = teamclone("play", schedule, "--out", out, code=1)
         assert "make room and give the same command again" in done.stderr
         (disk / "ballast").unlink()
-        answer = play(plan, out)
+        answer = play(schedule, out)
         assert (answer["complete"], answer["played"]) == (2, 1)
 
 
@@ -348,48 +358,52 @@ def check_six(out: Path, store: Path, answer: dict[str, Any]) -> None:
 @both_servers
 @pytest.mark.slow
 def test_six_pairings_with_trouble_end_in_twelve_outcomes(tmp_path: Path, server: str) -> None:
-    plan = write_plan(tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2)
-    answer = play(plan, tmp_path / "out", "-j", 2, "--ingest", tmp_path / "store", code=1)
+    schedule = write_schedule(
+        tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2
+    )
+    answer = play(schedule, tmp_path / "out", "-j", 2, "--ingest", tmp_path / "store", code=1)
     check_six(tmp_path / "out", tmp_path / "store", answer)
 
 
 @both_servers
 @pytest.mark.slow
 def test_the_same_after_five_kills_at_random(tmp_path: Path, server: str) -> None:
-    plan = write_plan(tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2)
+    schedule = write_schedule(
+        tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2
+    )
     out, store, chance = tmp_path / "out", tmp_path / "store", random.Random(5)
     for _ in range(5):
-        process = started(plan, out, "-j", "2", "--ingest", str(store))
+        process = started(schedule, out, "-j", "2", "--ingest", str(store))
         time.sleep(chance.uniform(1, 8))
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    answer = play(plan, out, "-j", 2, "--ingest", store, code=1)
+    answer = play(schedule, out, "-j", 2, "--ingest", store, code=1)
     check_six(out, store, answer)
 
 
 @both_servers
 @pytest.mark.slow
-def test_a_whole_plan_runs_and_what_is_there_is_kept(tmp_path: Path, server: str) -> None:
+def test_a_whole_schedule_runs_and_what_is_there_is_kept(tmp_path: Path, server: str) -> None:
     more = (
         "[dataset]\nteams = 'Red'\ntest = 0.2\nvalidation = 0.2\nunseen = 'Green'\n"
         "[train]\npreset = 'small'\nset = ['train.epochs=1', 'data.batches_per_epoch=2', 'data.batch_size=64']\n"
     )
     pairings = [("Red", "Blue"), ("Green", "Red")]
-    plan = write_plan(tmp_path, pairings, server=server, matches=5, more=more)
+    schedule = write_schedule(tmp_path, pairings, server=server, matches=5, more=more)
     out = tmp_path / "out"
 
     def stages() -> dict[str, bool]:
-        answer = json.loads(teamclone("run", plan, "--out", out, "-j", 2, "--json").stdout)
+        answer = json.loads(teamclone("pipeline", schedule, "--out", out, "-j", 2, "--json").stdout)
         return {stage["stage"]: stage["done"] for stage in answer["stages"]}
 
     assert stages() == dict.fromkeys(("play", "dataset", "train", "evaluate", "report"), True)
     assert "<html" in (out / "run" / "report.html").read_text()
     assert stages() == dict.fromkeys(("play", "dataset", "train", "evaluate", "report"), False)
-    text = plan.read_text()
-    plan.write_text(text.replace("train.epochs=1", "train.epochs=2"))
+    text = schedule.read_text()
+    schedule.write_text(text.replace("train.epochs=1", "train.epochs=2"))
     assert stages() == {"play": False, "dataset": False, "train": True, "evaluate": True, "report": True}
     assert (out / "run-before-1").is_dir()
-    plan.write_text(plan.read_text().replace("unseen = 'Green'\n", ""))
+    schedule.write_text(schedule.read_text().replace("unseen = 'Green'\n", ""))
     assert stages() == {"play": False, "dataset": True, "train": True, "evaluate": True, "report": True}
 
 
@@ -408,10 +422,21 @@ def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_p
             'train.set: expected "model.commands=dash,turn,kick,tackle,none", as [dataset] has them',
         ),
     ):
-        plan = write_plan(tmp_path, [("Red", "Blue")], more=more)
-        done = teamclone("run", plan, "--out", tmp_path / "out", code=2)
+        schedule = write_schedule(tmp_path, [("Red", "Blue")], more=more)
+        done = teamclone("pipeline", schedule, "--out", tmp_path / "out", code=2)
         assert words in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_the_former_name_of_pipeline_still_works_and_says_so(tmp_path: Path) -> None:
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], more="[train]\npreset = 'small'\n")
+    done = teamclone("run", schedule, "--out", tmp_path / "out", code=2)
+    former, mistake = done.stderr.splitlines()
+    assert former == "teamclone: run is now called pipeline; call teamclone pipeline instead"
+    assert "[train] needs [dataset]" in mistake
+    commands = teamclone("--help").stdout.split()
+    assert "pipeline" in commands
+    assert "run" not in commands
 
 
 def wait_for_match(out: Path, *, number: int = 1, glob: str = ".playing/*/*/output/right-team.txt") -> None:
@@ -425,51 +450,51 @@ def wait_for_match(out: Path, *, number: int = 1, glob: str = ".playing/*/*/outp
 
 @both_servers
 def test_a_folder_may_be_called_as_one_likes(tmp_path: Path, server: str) -> None:
-    plan = write_plan(tmp_path, [("Red", "Blue")], server=server)
-    assert play(plan, tmp_path / "it's = a: folder")["complete"] == 1
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], server=server)
+    assert play(schedule, tmp_path / "it's = a: folder")["complete"] == 1
 
 
 def test_a_server_that_waits_for_clients_after_the_end_has_played_the_match(tmp_path: Path) -> None:
     """Clients may stop answering when all is over; the server then says that it waited too long."""
-    plan = write_plan(tmp_path, [("Red", "Blue")], teams={"Red": f"{TEAM} --hang-at 40"})
-    plan.write_text(plan.read_text().replace("game_over_wait = 5", "game_over_wait = 100"))
-    [record] = play(plan, tmp_path / "out")["records"]
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], teams={"Red": f"{TEAM} --hang-at 40"})
+    schedule.write_text(schedule.read_text().replace("game_over_wait = 5", "game_over_wait = 100"))
+    [record] = play(schedule, tmp_path / "out")["records"]
     assert record["outcome"] == "complete"
     assert record["server"]["missed_cycles"] > 20
 
 
 def test_a_match_without_its_record_is_played_again_once(tmp_path: Path) -> None:
-    plan, out = write_plan(tmp_path, [("Red", "Blue")]), tmp_path / "out"
-    play(plan, out)
+    schedule, out = write_schedule(tmp_path, [("Red", "Blue")]), tmp_path / "out"
+    play(schedule, out)
     (out / "matches" / "Red-vs-Blue-1" / NAME).unlink()
-    assert play(plan, out)["played"] == 1
-    assert play(plan, out)["played"] == 0
+    assert play(schedule, out)["played"] == 1
+    assert play(schedule, out)["played"] == 0
 
 
 def test_a_module_in_the_current_folder_is_not_taken_for_python_s_own(tmp_path: Path) -> None:
     (tmp_path / "platform.py").write_text("raise SystemExit('not me')")
-    plan = write_plan(tmp_path, [("Red", "Blue")])
-    done = teamclone("play", plan, "--out", tmp_path / "out", cwd=tmp_path)
+    schedule = write_schedule(tmp_path, [("Red", "Blue")])
+    done = teamclone("play", schedule, "--out", tmp_path / "out", cwd=tmp_path)
     assert "1 complete" in done.stdout
 
 
 def test_a_long_command_is_a_command(tmp_path: Path) -> None:
     red = f"sh -c 'true /{'x' * 300}; exec {TEAM}'".replace("'", '"')
-    assert play(write_plan(tmp_path, [("Red", "Blue")], teams={"Red": red}), tmp_path / "out")["complete"] == 1
+    assert play(write_schedule(tmp_path, [("Red", "Blue")], teams={"Red": red}), tmp_path / "out")["complete"] == 1
 
 
 def test_the_server_s_cycle_may_be_another(tmp_path: Path) -> None:
     """What a match's length should be is what its own log says, not what we think."""
-    plan = write_plan(tmp_path, [("Red", "Blue")])
-    plan.write_text(plan.read_text().replace("half_time = 2,", "half_time = 1, nr_normal_halfs = 4,"))
-    [record] = play(plan, tmp_path / "out")["records"]
+    schedule = write_schedule(tmp_path, [("Red", "Blue")])
+    schedule.write_text(schedule.read_text().replace("half_time = 2,", "half_time = 1, nr_normal_halfs = 4,"))
+    [record] = play(schedule, tmp_path / "out")["records"]
     assert record["cycles"] == 40
 
 
-def test_ctrl_c_does_not_wait_for_a_keeper_that_is_stuck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_does_not_wait_for_a_supervisor_that_is_stuck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("teamclone.play.runner._END_S", 1.0)
     out = tmp_path / "out"
-    fixture = load_plan(write_plan(tmp_path, [("Red", "Blue")], half_time=300)).fixtures[0]
+    fixture = load_schedule(write_schedule(tmp_path, [("Red", "Blue")], half_time=300)).fixtures[0]
     folder, wanted = out / "match", out / "wanted"
     folder.mkdir(parents=True)
     wanted.touch()
@@ -477,8 +502,10 @@ def test_ctrl_c_does_not_wait_for_a_keeper_that_is_stuck(tmp_path: Path, monkeyp
     with ThreadPoolExecutor(1) as pool:
         asked = pool.submit(_attempt, order, wanted)
         wait_for_match(out, glob="match/output/right-team.txt")
-        [keeper] = [child for child in psutil.Process().children() if "teamclone.play.supervisor" in child.cmdline()]
-        keeper.suspend()
+        [supervisor] = [
+            child for child in psutil.Process().children() if "teamclone.play.supervisor" in child.cmdline()
+        ]
+        supervisor.suspend()
         wanted.unlink()
         with pytest.raises(UsageError, match="no longer wanted"):
             asked.result(20)

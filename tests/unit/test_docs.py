@@ -1,4 +1,4 @@
-"""Every command has a page that names every option, and the README's commands are the demo's."""
+"""Every command has a page that names every option, every page is in the menu, and links lead somewhere."""
 
 from __future__ import annotations
 
@@ -12,37 +12,68 @@ import typer.main
 from teamclone.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+DOCS = ROOT / "docs"
+COMMANDS = {
+    name: command
+    for name, command in typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
+    if not command.hidden
+}
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_a_command_has_a_page_that_names_every_option(name: str) -> None:
-    page = (ROOT / "docs" / f"{name}.md").read_text()
+    page = (DOCS / "reference" / "commands" / f"{name}.md").read_text()
     command: Any = COMMANDS[name]
-    missing = [
+    options = [
         option
         for parameter in command.params
         for option in parameter.opts
         if option.startswith("--") and option != "--help"
     ]
-    assert [option for option in missing if f"`{option}" not in page and f" {option}" not in page] == []
+    assert options
+    assert [option for option in options if f"`{option}`" not in page] == []
 
 
-def test_the_readme_links_every_page() -> None:
-    readme = (ROOT / "README.md").read_text()
-    pages = {path.name for path in (ROOT / "docs").glob("*.md")}
-    assert pages - set(re.findall(r"docs/([\w-]+\.md)", readme)) == set()
+def test_every_command_page_is_of_a_command() -> None:
+    assert {page.stem for page in (DOCS / "reference" / "commands").glob("*.md")} == set(COMMANDS)
 
 
-def test_every_link_of_the_docs_leads_somewhere() -> None:
-    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
-        for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text()):
-            if not target.startswith("http"):
-                assert (page.parent / target).exists(), f"{page.name}: {target}"
+def test_the_menu_lists_every_page_once() -> None:
+    listed = re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)
+    assert sorted(listed) == sorted(str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md"))
+
+
+def test_every_link_leads_somewhere() -> None:
+    """Files and headings, as GitHub and the site both name them."""
+    for page in (*ROOT.glob("*.md"), *DOCS.rglob("*.md")):
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", page.read_text()):
+            if target.startswith("http"):
+                continue
+            found = page.parent / target if target else page
+            assert found.exists(), f"{page.name}: {target}"
+            assert not anchor or anchor in anchors(found), f"{page.name}: {target}#{anchor}"
+
+
+def anchors(page: Path) -> set[str]:
+    """Names of the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_links_inside_the_docs_stay_there() -> None:
+    """The site holds nothing else."""
+    for page in DOCS.rglob("*.md"):
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text()):
+            assert target.startswith("http") or (page.parent / target).resolve().is_relative_to(DOCS), page
+
+
+def test_pages_speak_of_players_without_gender() -> None:
+    for page in (ROOT / "README.md", *DOCS.rglob("*.md")):
+        assert re.findall(r"\b(he|him|his)\b", page.read_text(), re.IGNORECASE) == [], page
 
 
 def test_the_commands_of_the_readme_are_those_of_the_demo() -> None:
-    """What the README tells to type is what `make demo` runs, so it works."""
+    """What the README asks to type is what `make demo` runs, so it works."""
     readme = (ROOT / "README.md").read_text()
     blocks = "\n".join(re.findall(r"```sh\n(.*?)```", readme, re.DOTALL))
     typed = {" ".join(line.split()[:2]) for line in blocks.splitlines() if line.startswith("teamclone ")}

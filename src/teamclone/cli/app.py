@@ -16,9 +16,9 @@ from teamclone.cli import (
     info,
     ingest,
     matches,
+    pipeline,
     play,
     report,
-    run,
     search,
     sql,
     train,
@@ -50,7 +50,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
-    run.run,
+    pipeline.pipeline,
     play.play,
     info.info,
     validate.validate,
@@ -66,6 +66,7 @@ for command in (
     bench.bench,
 ):
     app.command()(command)
+app.command("run", hidden=True)(pipeline.run)
 
 
 @app.callback(invoke_without_command=True)

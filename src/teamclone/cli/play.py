@@ -18,9 +18,12 @@ COUNTS = ("holes", "clashes", "missed")
 
 def play(
     out: Annotated[Path, typer.Option("--out", help="Folder for the matches; one that was begun is gone on with.")],
-    plan: Annotated[Path | None, typer.Argument(help="Plan (TOML): teams, pairings, options of the server.")] = None,
+    schedule: Annotated[
+        Path | None, typer.Argument(help="Schedule (TOML): teams, pairings, options of the server.")
+    ] = None,
     left: Annotated[
-        str | None, typer.Option(help="Instead of a plan: command that starts a team, or folder with a start script.")
+        str | None,
+        typer.Option(help="Instead of a schedule: command that starts a team, or folder with a start script."),
     ] = None,
     right: Annotated[str | None, typer.Option(help="The other team.")] = None,
     matches: Annotated[int, typer.Option("-n", "--matches", min=1, help="Matches of --left and --right.")] = 1,
@@ -45,20 +48,22 @@ def play(
     from teamclone.cli.common import print_json, progress, values_of
     from teamclone.errors import UsageError
     from teamclone.play.runner import play as run
-    from teamclone.play.schedule import load_plan, quick_plan
+    from teamclone.play.schedule import load_schedule, quick_schedule
     from teamclone.store import create_store
     from teamclone.system.cluster import executor_of
 
-    if (plan is None) == (left is None and right is None):
-        raise UsageError("give a plan, or --left and --right")
-    if plan is not None:
+    if (schedule is None) == (left is None and right is None):
+        raise UsageError("give a schedule, or --left and --right")
+    if schedule is not None:
         if server or options or matches != 1:
-            raise UsageError("--server, --set and --matches go with --left and --right; a plan says all that itself")
-        asked = load_plan(plan)
+            raise UsageError(
+                "--server, --set and --matches go with --left and --right; a schedule says all that itself"
+            )
+        asked = load_schedule(schedule)
     else:
         if left is None or right is None:
             raise UsageError("--left and --right need each other")
-        asked = quick_plan(
+        asked = quick_schedule(
             left, right, matches=matches, server=server or "rcssserver", options=values_of(options or [])
         )
     with executor_of(scheduler, jobs=jobs) as executor, progress("play") as bar:
@@ -87,7 +92,7 @@ def play(
 
 
 def line_of(record: Record) -> str:
-    """What became of a match, in a line."""
+    """Say in a line what became of a match."""
     if record.trouble is not None:
         return f"{record.id}: failed after {record.attempt} attempts: {record.trouble.fault}: {record.trouble.text}"
     left, right = record.left, record.right
@@ -95,7 +100,7 @@ def line_of(record: Record) -> str:
 
 
 def print_report(report: PlayReport) -> None:
-    """Pairings with what became of their matches, then the failed ones."""
+    """Print pairings with what became of their matches, then the failed ones."""
     from teamclone.cli.common import print_table
 
     pairings: dict[tuple[str, str], list[Record]] = {}

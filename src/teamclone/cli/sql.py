@@ -23,7 +23,7 @@ def sql(
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, all rows.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list of objects, all rows.")] = False,
 ) -> None:
-    """Ask a store in SQL. docs/data-model.md lists the tables."""
+    """Ask a store in SQL. docs/reference/data-model.md lists the tables."""
     from teamclone.errors import UsageError
     from teamclone.store import open_store
 

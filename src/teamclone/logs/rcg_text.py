@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from teamclone.errors import LogError
 from teamclone.logs import scan
 from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
-from teamclone.logs.columns import COUNTERS, PLAYERS, counter_name
-from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity
+from teamclone.logs.match import Columns, GameLog, Problem, Severity
+from teamclone.logs.shows import read_shows
 from teamclone.rcss.playmodes import BY_NAME
 
 _PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')
@@ -178,39 +178,14 @@ def _scan(
 ) -> tuple[Columns, Columns, NDArray[np.bool_]]:
     """Frames of the show lines: cycle and ball, player columns, and which lines were good."""
     n = len(starts)
-    cycles = np.empty(n, np.int32)
-    ball = np.empty((4, n), np.float32)
-    floats = np.empty((len(scan.PLAYER_FLOATS), n, N_PLAYERS), np.float32)
-    counters = np.empty((len(COUNTERS), n, N_PLAYERS), np.int32)
-    dtypes = {column.name: column.dtype for column in PLAYERS}
-    whole = {
-        name: np.empty((n, N_PLAYERS), dtypes[name])
-        for name in ("type", "state", "view_quality", "attention_side", "attention_unum")
-    }
-    outcomes = np.empty(n, np.uint8)
-    places = np.empty(n, np.int64)
-    n_good = scan.scan_shows(
-        buffer,
-        starts,
-        stops,
-        cycles,
-        ball,
-        floats,
-        whole["type"],
-        whole["state"],
-        whole["view_quality"],
-        whole["attention_side"],
-        whole["attention_unum"],
-        counters,
-        outcomes,
-        places,
-    )
-    good = outcomes == scan.OK
+    shows = read_shows(buffer, starts, stops)
+    good = shows.outcomes == scan.OK
+    n_good = int(np.count_nonzero(good))
     if n_good < n:
         bad = np.flatnonzero(~good)
         first = int(bad[0])
         last_line = bool(len(bad) == 1 and first == n - 1 and stops[first] == len(buffer))
-        text = _WHAT[int(outcomes[first])]
+        text = _WHAT[int(shows.outcomes[first])]
         problems.append(
             Problem(
                 code="truncated" if last_line else "bad-show",
@@ -220,8 +195,8 @@ def _scan(
                 else f"{text}; {len(bad)} of {n} frames are left out",
                 path=path,
                 line=int(lines[first]) + 1,
-                byte=int(places[first]),
-                cycle=int(cycles[first]) if cycles[first] >= 0 else None,
+                byte=int(shows.places[first]),
+                cycle=int(shows.cycle[first]) if shows.cycle[first] >= 0 else None,
             )
         )
     if not n_good:
@@ -231,8 +206,5 @@ def _scan(
             line=int(lines[0]) + 1 if n else None,
         )
     keep = slice(None) if n_good == n else good
-    players: Columns = {name: floats[index, keep] for index, name in enumerate(scan.PLAYER_FLOATS)}
-    players |= {name: values[keep] for name, values in whole.items()}
-    players |= {counter_name(kind): counters[index, keep] for index, kind in enumerate(COUNTERS)}
-    ordered = {column.name: players[column.name] for column in PLAYERS}
-    return {"cycle": cycles[keep], "ball": ball[:, keep].T}, ordered, good
+    players = {name: column[keep] for name, column in shows.players.items()}
+    return {"cycle": shows.cycle[keep], "ball": shows.ball[keep]}, players, good

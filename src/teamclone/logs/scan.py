@@ -1,7 +1,7 @@
 """Scanning kernels: bytes of a text log to arrays of numbers, compiled by Numba.
 
-They allocate nothing and raise nothing: what they cannot read they mark, and the callers in `rcg_text` and `rcl`
-say it in words.
+They allocate nothing and raise nothing: what they cannot read they mark, and the callers in `shows`, `rcg_text`
+and `rcl` say it in words.
 
 Most of a log is short numbers and words of unforeseeable length, so a loop over bytes would cost a mispredicted branch
 each. Where it matters eight bytes are taken as one 64-bit word (first byte lowest) and the questions "which byte is no
@@ -457,7 +457,7 @@ def scan_shows(
     outcomes: NDArray[np.uint8],
     places: NDArray[np.int64],
 ) -> int:
-    """Reads n lines ``(show ...)`` of log versions 4 to 6.
+    """Reads n lines ``(show ...)`` of log versions 4 to 6, or of monitors since version 3.
 
     Args:
         buffer: the log.
@@ -488,7 +488,14 @@ def scan_shows(
             places[frame] = position
             continue
         cycles[frame] = np.int32(value)
-        position = _expect(buffer, after, stop, 40)
+        # Monitors get (pm ..) and (tm ..) in front of the ball; logs have neither.
+        position = _blank(buffer, after, stop)
+        while position + 1 < stop and _byte(buffer, position) == 40 and 97 <= _byte(buffer, position + 1) <= 122:
+            position = _skip_group(buffer, position + 1, stop)
+            if position < 0:
+                break
+            position = _blank(buffer, position, stop)
+        position = _expect(buffer, position, stop, 40)
         position = _expect(buffer, position, stop, 40)
         position = _expect(buffer, position, stop, 98)
         position = _expect(buffer, position, stop, 41)
@@ -527,7 +534,7 @@ def scan_shows(
             if _byte(buffer, at) != 40:
                 outcome = BAD_STRUCTURE
                 break
-            # Monitor packets put (pm ..) and (tm ..) before the players; logs do not.
+            # A group of an unknown kind.
             if at + 1 < stop and _byte(buffer, at + 1) != 40:
                 position = _skip_group(buffer, at + 1, stop)
                 if position < 0:

@@ -1,1 +1,1 @@
-"""Playing matches on rcssserver, unattended: from a plan to folders of logs."""
+"""Playing matches on rcssserver, unattended: from a schedule to folders of logs."""

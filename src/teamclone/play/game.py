@@ -8,7 +8,6 @@ import shutil
 import signal
 import sys
 import time
-from collections.abc import Iterable
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
@@ -16,16 +15,16 @@ import psutil
 
 from teamclone.play.ports import held_ports
 from teamclone.play.processes import MARK, end_all, start
-from teamclone.play.record import Fault
+from teamclone.play.record import FailedError, Fault, who
 from teamclone.play.schedule import N_UNUMS, Fixture, TeamSpec, filled_in
 from teamclone.play.server import last_words, met_taken_port, server_environment, server_words
-from teamclone.protocol.monitor import Monitor, Scene
+from teamclone.protocol.client import LOOPBACK, MonitorClient
+from teamclone.protocol.monitor import Show, load_reader
 
 SIDES = ("left", "right")
 LEAST_ROOM = 32 << 20
 """Bytes that must be free: a match takes a quarter of it."""
 
-_HOST = "127.0.0.1"
 _POLL_S = 0.05
 _LOOK_S = 2.0
 """Between two looks at a match that goes on."""
@@ -37,15 +36,7 @@ _SERVER_LOG = "server.txt"
 
 
 class StoppedError(Exception):
-    """Who asked for the match no longer wants it."""
-
-
-class FailedError(Exception):
-    """The match cannot go on."""
-
-    def __init__(self, fault: Fault, text: str, *, side: int | None = None, unums: Iterable[int] = ()) -> None:
-        super().__init__(text)
-        self.fault, self.text, self.side, self.unums = fault, text, side, tuple(sorted(int(unum) for unum in unums))
+    """The match is no longer wanted."""
 
 
 class Game:
@@ -66,7 +57,7 @@ class Game:
         self.clients: tuple[dict[str, psutil.Popen], dict[str, psutil.Popen]] = ({}, {})
         self.commands: dict[str, list[str]] = {}
         self.port = 0
-        self.scene: Scene | None = None
+        self.show: Show | None = None
         self.seen: tuple[set[int], set[int]] = (set(), set())
         self.heard_at = time.monotonic()
         self.gone_at: float | None = None
@@ -79,25 +70,34 @@ class Game:
     def _ask_to_stop(self, *_: object) -> None:
         self.stop = True
 
-    def look(self, monitor: Monitor | None = None, *, seconds: float = _POLL_S) -> None:
-        """Wait a moment, then see what is new; raises what ends the match."""
+    def look(self, monitor: MonitorClient | None = None, *, seconds: float = _POLL_S) -> None:
+        """Wait a moment, then take in what the monitor shows.
+
+        Args:
+            monitor: None where there is nothing to see yet.
+            seconds: how long to wait.
+
+        Raises:
+            FailedError: players are gone.
+            StoppedError: the match is no longer wanted.
+        """
         readable, _, _ = select.select([sys.stdin], [], [], seconds)
         if self.stop or (readable and not os.read(sys.stdin.fileno(), 1)):
             raise StoppedError
-        scene = monitor.latest() if monitor else None
-        if scene is None:
+        show = monitor.latest() if monitor else None
+        if show is None:
             return
         now = time.monotonic()
-        self.heard_at, self.scene = now, scene
-        if scene.begun and self.kick_off_at is None:
+        self.heard_at, self.show = now, show
+        if show.begun and self.kick_off_at is None:
             self.kick_off_at = now
-        if scene.over:
+        if show.over:
             self.end_at = self.end_at or now
             return
         missing = False
-        for side in range(2):
-            gone = self.seen[side] - scene.present[side]
-            self.seen[side].update(scene.present[side])
+        for side, present in enumerate(show.present):
+            gone = self.seen[side] - present
+            self.seen[side].update(present)
             if gone:
                 missing = True
                 self.gone_at = self.gone_at or now
@@ -108,23 +108,23 @@ class Game:
             self.gone_at = None
 
     def how_ended(self, side: int) -> str:
-        """Processes of a team that ended by themselves, in words."""
+        """Say which processes of a team ended by themselves, and how."""
         labels: dict[int, list[str]] = {}
         for label, client in self.clients[side].items():
             code = client.poll()
             if code is not None:
                 labels.setdefault(code, []).append(label)
-        told = [f"{', '.join(ended)} {_ending(code)}" for code, ended in labels.items()]
-        return f" ({'; '.join(told)})" if told else ""
+        ended = [f"{', '.join(names)} {_ending(code)}" for code, names in labels.items()]
+        return f" ({'; '.join(ended)})" if ended else ""
 
     def is_over(self, *, kicked_off: bool = True) -> bool:
-        """Whether the server has ended as it should; whether it played to the end its logs must tell.
+        """Return whether the server has ended as it should; whether it played to the end its logs must show.
 
         Args:
             kicked_off: False while teams are still to come, when the server should not end at all.
 
         Raises:
-            FailedError: it ended otherwise, or gives no sign of life.
+            FailedError: it ended in another way, or gives no sign of life.
         """
         code = None if self.server is None else self.server.poll()
         if code is None:
@@ -135,7 +135,7 @@ class Game:
         words = self.server_output()
         if met_taken_port(words):
             raise FailedError(Fault.NO_PORT, last_words(words))
-        if self.scene is None:
+        if self.show is None:
             raise FailedError(Fault.SERVER_START, f"the server {_ending(code)}: {last_words(words)}")
         if code != 0 or not kicked_off:
             raise FailedError(Fault.SERVER_DIED, f"the server {_ending(code)} before the end: {last_words(words)}")
@@ -143,29 +143,31 @@ class Game:
         return True
 
     def server_output(self) -> str:
+        """Return what the server has printed so far."""
         with suppress(OSError):
             return (self.output / _SERVER_LOG).read_text("utf-8", "replace")
         return ""
 
     def play(self) -> None:
-        """From the start of the server to its end. Afterwards call ``finish``, whatever happened.
+        """Play from the start of the server to its end. Afterwards call `finish`, whatever happened.
 
         Raises:
             FailedError: it did not come to its end.
-            StoppedError: who asked for it no longer wants it.
+            StoppedError: it is no longer wanted.
         """
         free = shutil.disk_usage(self.folder).free
         if free < LEAST_ROOM:
             text = f"{free / 1e6:.0f} MB are free, a match needs {LEAST_ROOM / 1e6:.0f} MB"
             raise FailedError(Fault.DISK_FULL, text)
+        load_reader()
         self.port = self.take_port()
         started = time.monotonic()
         self.start_server()
-        with closing(Monitor(self.port)) as monitor:
+        with closing(MonitorClient(self.port)) as monitor:
             self.wait_for_server(monitor)
             self.bring_in_teams(monitor)
             while not self.is_over():
-                # A player who is gone is kept in sight until it is known who is with him.
+                # When a player is gone we stay, to see which others are.
                 watching = self.kick_off_at is None or self.gone_at is not None
                 monitor.rest_s = 0.0 if watching else min(_LOOK_S, self.fixture.limits.stall_s / 4)
                 self.look(monitor)
@@ -177,7 +179,7 @@ class Game:
                     raise FailedError(Fault.TOO_LONG, f"not over after {self.fixture.match_s:g} s")
 
     def take_port(self) -> int:
-        """The first of three ports, which are ours until the processes have ended."""
+        """Take three ports in a row until the processes have ended; return the first."""
         while True:
             try:
                 port = self.held.enter_context(held_ports(any_block=self.fixture.takes_port))
@@ -191,6 +193,7 @@ class Game:
             return port
 
     def start_server(self) -> None:
+        """Start the server in the folder of the match."""
         conf = self.folder / "conf"
         conf.mkdir()
         words = server_words(self.program, self.fixture, port=self.port)
@@ -206,13 +209,14 @@ class Game:
         except OSError as error:
             raise FailedError(Fault.SERVER_START, f"{self.program}: {error.strerror}") from None
 
-    def wait_for_server(self, monitor: Monitor) -> None:
-        while self.scene is None:
+    def wait_for_server(self, monitor: MonitorClient) -> None:
+        """Wait until the server answers the monitor."""
+        while self.show is None:
             self.look(monitor)
             self.is_over(kicked_off=False)
 
-    def bring_in_teams(self, monitor: Monitor) -> None:
-        """One client after the other, so that each has the number by which we know it; the left team's first of all."""
+    def bring_in_teams(self, monitor: MonitorClient) -> None:
+        """Start one client after the other, so that each gets the number we know it by; the left goalkeeper first."""
         began = [0.0, 0.0]
         waiting = [team.clients() for team in self.teams]
         number = 0
@@ -230,7 +234,8 @@ class Game:
         for side in range(2):
             self.wait_for_players(monitor, N_UNUMS, side=side, began=began[side])
 
-    def wait_for_players(self, monitor: Monitor, number: int, *, side: int, began: float) -> None:
+    def wait_for_players(self, monitor: MonitorClient, number: int, *, side: int, began: float) -> None:
+        """Wait until so many players of a side have connected."""
         while len(self.seen[side]) < number:
             self.look(monitor)
             self.is_over(kicked_off=False)
@@ -244,7 +249,7 @@ class Game:
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)
 
     def check_clients(self) -> None:
-        """Raises that a process ended before the kick-off, unless it ended well, as scripts do."""
+        """Raise FailedError if a process ended before the kick-off, unless it ended well, as scripts do."""
         for side in range(2):
             for label, client in self.clients[side].items():
                 code = client.poll()
@@ -254,9 +259,10 @@ class Game:
                     raise FailedError(Fault.TEAM_START, text, side=side)
 
     def start_client(self, side: int, label: str, words: list[str]) -> None:
+        """Start a client in its team's folder."""
         team = self.teams[side]
         values = {
-            "host": _HOST,
+            "host": LOOPBACK,
             "port": self.port,
             "coach_port": self.port + 1,
             "olcoach_port": self.port + 2,
@@ -278,7 +284,7 @@ class Game:
             raise FailedError(Fault.TEAM_START, text, side=side) from None
 
     def finish(self, *, failed: bool) -> dict[str, dict[str, int | None]]:
-        """End all processes; how those of the teams ended that did so by themselves, by side and label."""
+        """End all processes; return how those of the teams ended that did so by themselves, by side and label."""
         if self.server is not None and self.server.poll() is None:
             with suppress(psutil.NoSuchProcess):
                 self.server.terminate()  # it then closes its logs
@@ -294,17 +300,8 @@ class Game:
         return exits
 
 
-def who(team: TeamSpec, unums: Iterable[int]) -> str:
-    """Players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
-    numbers = sorted(unums)
-    if len(numbers) == N_UNUMS:
-        return f"{team.name}: the whole team is"
-    names = ", ".join(map(str, numbers))
-    return f"{team.name}: player{'s' if len(numbers) > 1 else ''} {names} {'are' if len(numbers) > 1 else 'is'}"
-
-
 def _ending(code: int | None) -> str:
-    """An exit code in words."""
+    """Say an exit code in words."""
     if code is None:
         return "still runs"
     if code < 0:

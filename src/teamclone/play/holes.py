@@ -1,7 +1,7 @@
 """Holes and clashes: how reliably a team's commands reached the server, counted from the logs of a match.
 
-A hole is a cycle in which a player on the field gave no body command, a clash one in which he gave several, of which
-the server takes the first. In a missed cycle nothing at all came from him, in synch mode not even ``(done)``.
+A hole is a cycle in which a player on the field gave no body command, a clash one with several, of which the server
+takes the first. In a missed cycle nothing at all came from the player, in synch mode not even ``(done)``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Holes:
     Attributes:
         holes, clashes, missed: (22,) number of cycles, left 1..11 then right 1..11.
         longest_silence: (22,) most missed cycles in a row.
-        last_heard: (22,) time of the last frame on which something came from him; -1 where nothing did.
+        last_heard: (22,) time of the last frame on which something came from the player; -1 where nothing did.
     """
 
     holes: NDArray[np.int64]
@@ -37,7 +37,7 @@ class Holes:
 
 
 def count_holes(match: Match) -> Holes:
-    """Holes, clashes and missed cycles of every player."""
+    """Count holes, clashes and missed cycles of every player."""
     commands, cycle = match.commands, match.frames["cycle"]
     n_frames = len(cycle)
     slot = slot_of(commands["side"], commands["unum"])
@@ -64,6 +64,6 @@ def count_holes(match: Match) -> Holes:
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> int:
-    """Most True in a row."""
+    """Return how many True there are in a row at most."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -20,7 +20,7 @@ LAST_PORT = 32_000
 
 @contextmanager
 def held_ports(*, any_block: bool) -> Iterator[int | None]:
-    """The first port of a block that is free and that no other match takes while it is held; None where none is.
+    """Hold a block of ports that is free, against other matches: its first port, None where no block is free.
 
     Args:
         any_block: False for teams that can have no port but the default, which is left to them.
@@ -47,7 +47,7 @@ def held_ports(*, any_block: bool) -> Iterator[int | None]:
 
 
 def is_free(port: int) -> bool:
-    """Whether no process listens at this UDP port, on any address."""
+    """Return whether no process listens at this UDP port, on any address."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as test:
         try:
             test.bind(("", port))

@@ -1,7 +1,7 @@
-"""Processes of a match: started so that none outlives it, whatever they do and however its keeper ends.
+"""Processes of a match: started so that none outlives it, whatever they do and however its supervisor ends.
 
-On Linux the keeper adopts what its children leave behind, also what made itself a daemon, and its children die with it.
-Elsewhere an orphan is out of reach once its parent is gone.
+On Linux the supervisor adopts what its children leave behind, also what made itself a daemon, and its children die with
+it. Elsewhere an orphan is out of reach once its parent is gone.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def adopt_orphans() -> None:
 
 
 def start(words: Sequence[str], *, folder: Path, environment: Mapping[str, str], output: Path) -> psutil.Popen:
-    """A process in a session of its own, with its output in a file. To be called from a single thread.
+    """Start a process in a session of its own, with its output in a file. To be called from a single thread.
 
     Raises:
         OSError: it cannot be started.
@@ -74,13 +74,13 @@ def end_all(*, grace_s: float = GRACE_S) -> None:
         for process in left:
             with suppress(psutil.NoSuchProcess):
                 process.kill()
-        # The killed may have had children of their own, who are ours now.
+        # The killed may have had children of their own, which are ours now.
         left = _descendants()
         deadline = time.monotonic() + 0.5
 
 
 def _descendants() -> list[psutil.Process]:
-    """The living ones; the dead among them are buried."""
+    """Find the processes that descend from this one and live; the dead among them are reaped."""
     found = psutil.Process().children(recursive=True)
     alive = []
     for process in found:
@@ -94,7 +94,7 @@ def _descendants() -> list[psutil.Process]:
 
 
 def kill_marked(folder: Path) -> None:
-    """Kill the processes of matches played in or under a folder whose keeper is gone."""
+    """Kill the processes of matches played in or under a folder whose supervisor is gone."""
     folder, killed = folder.resolve(), []
     for process in psutil.process_iter():
         with suppress(psutil.Error, OSError):

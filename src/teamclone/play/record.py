@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Self
 
 from teamclone.errors import PlayError
+from teamclone.play.schedule import N_UNUMS, TeamSpec
 from teamclone.system.files import write_json
 
-FORMAT = 1
+FORMAT = 2
 NAME = "match.json"
 
 
@@ -33,8 +35,29 @@ class Fault(StrEnum):
     TOO_LONG = "took too long"
     DISK_FULL = "disk full"
     BAD_LOGS = "logs not whole"
-    KEEPER_DIED = "keeper died"
+    SUPERVISOR_DIED = "supervisor died"
     """The process that looks after a match was killed."""
+
+
+class FailedError(Exception):
+    """A match has failed.
+
+    Attributes:
+        fault, text, side, unums: as in `Trouble`, but for the side: 0 left, 1 right.
+    """
+
+    def __init__(self, fault: Fault, text: str, *, side: int | None = None, unums: Iterable[int] = ()) -> None:
+        super().__init__(text)
+        self.fault, self.text, self.side, self.unums = fault, text, side, tuple(sorted(int(unum) for unum in unums))
+
+
+def who(team: TeamSpec, unums: Iterable[int]) -> str:
+    """Name players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
+    numbers = sorted(unums)
+    if len(numbers) == N_UNUMS:
+        return f"{team.name}: the whole team is"
+    names = ", ".join(map(str, numbers))
+    return f"{team.name}: player{'s' if len(numbers) > 1 else ''} {names} {'are' if len(numbers) > 1 else 'is'}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +78,7 @@ class Trouble:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
+        """Make it of what `to_json` returned."""
         return cls(**{**values, "fault": Fault(values["fault"]), "unums": tuple(values["unums"])})
 
 
@@ -63,7 +87,7 @@ class Side:
     """A team in a match.
 
     Attributes:
-        team: its name in the plan.
+        team: its name in the schedule.
         name: its name in the logs; None where it never came.
         score: goals.
         holes, clashes, missed: of players 1 to 11, see `holes`; None where there are no whole logs.
@@ -82,6 +106,7 @@ class Side:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
+        """Make it of what `to_json` returned."""
         lists = {
             name: value and tuple(value) for name, value in values.items() if name in ("holes", "clashes", "missed")
         }
@@ -125,13 +150,16 @@ class Record:
 
     @property
     def complete(self) -> bool:
+        """Whether the match was played to its end."""
         return self.trouble is None
 
     def to_json(self) -> dict[str, Any]:
+        """Return it as a JSON document holds it."""
         return {"format": FORMAT, "outcome": "complete" if self.complete else "failed", **dataclasses.asdict(self)}
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
+        """Make it of what `to_json` returned."""
         kept = {name: value for name, value in values.items() if name not in ("format", "outcome")}
         kept["trouble"] = kept["trouble"] and Trouble.from_json(kept["trouble"])
         kept |= {side: Side.from_json(kept[side]) for side in ("left", "right")}
@@ -140,17 +168,18 @@ class Record:
 
 
 def bury_logs(folder: Path) -> None:
-    """Rename the logs of what is no match, so that no reader takes them for one."""
+    """Rename the logs of a failed attempt, so that no reader takes them for a match."""
     for path in [*folder.glob("*.rcg*"), *folder.glob("*.rcl*")]:
         path.rename(f"{path}.failed")
 
 
 def save_record(folder: Path, record: Record) -> None:
+    """Write the record of a match into its folder."""
     write_json(folder / NAME, record.to_json())
 
 
 def load_record(folder: Path) -> Record | None:
-    """The record in a folder; None where there is none.
+    """Read the record in a folder; None where there is none.
 
     Raises:
         PlayError: it is not one that this version reads.

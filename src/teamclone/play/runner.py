@@ -1,7 +1,7 @@
-"""A plan's matches, one after the other or many at once: resumed where it stopped, tried again where one failed.
+"""The matches of a schedule, many at once: gone on with where it stopped, tried again where one failed.
 
-In the folder of a plan, ``matches/ID`` is a whole match and appears at once, ``failed/ID/N`` is what is left of attempt
-N, whose logs no reader takes for logs. What is being played lies in ``.playing``.
+In the folder of a schedule, ``matches/ID`` is a whole match and appears at once, ``failed/ID/N`` is what is left of
+attempt N, whose logs no reader takes for logs. What is being played lies in ``.playing``.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from typing import Any
 from teamclone.errors import PlayError, StoreError, UsageError
 from teamclone.play.processes import kill_marked
 from teamclone.play.record import Fault, Record, Side, Trouble, bury_logs, load_record, save_record
-from teamclone.play.schedule import Fixture, Plan
+from teamclone.play.schedule import Fixture, Schedule
 from teamclone.play.server import find_server
 from teamclone.play.supervisor import STOPPED, Order
 from teamclone.store.ingest import ingest
@@ -41,7 +41,7 @@ _PLAYING = ".playing"
 _LOCK = ".lock"
 _POLL_S = 0.2
 _END_S = 30.0
-"""How long a keeper has to end its match."""
+"""How long a supervisor has to end its match."""
 
 OnRecord = Callable[[Record], None]
 """Called with what became of a match, as soon as that is known."""
@@ -49,10 +49,10 @@ OnRecord = Callable[[Record], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayReport:
-    """What became of each match of a plan.
+    """What became of each match of a schedule.
 
     Attributes:
-        records: of all matches, in the order of the plan: the match, or the last attempt at it.
+        records: of all matches, in the order of the schedule: the match, or the last attempt at it.
         played: how many were played now; the others were there before.
         seconds: how long it took.
     """
@@ -63,9 +63,11 @@ class PlayReport:
 
     @property
     def failed(self) -> tuple[Record, ...]:
+        """Records of the matches that are not complete."""
         return tuple(record for record in self.records if not record.complete)
 
     def to_json(self) -> dict[str, Any]:
+        """Return it as a JSON document holds it."""
         return {
             "matches": len(self.records),
             "complete": len(self.records) - len(self.failed),
@@ -87,7 +89,7 @@ class _Task:
 
 
 def play(
-    plan: Plan,
+    schedule: Schedule,
     out: Path,
     *,
     store: Store | None = None,
@@ -97,10 +99,10 @@ def play(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_record: OnRecord = lambda record: None,
 ) -> PlayReport:
-    """Play what is missing of a plan.
+    """Play what is missing of a schedule.
 
-    A match that failed is tried up to ``plan.attempts`` times, then it counts as failed, also for the next call. When
-    this ends, however it ends, servers and clients end with it.
+    A match that failed is tried up to ``schedule.attempts`` times, then it counts as failed, also for the next call.
+    When this ends, however it ends, servers and clients end with it.
 
     Args:
         out: where the matches go; with those of an earlier call that was stopped or killed.
@@ -109,10 +111,10 @@ def play(
             ``out`` and the teams under the same paths. None plays on this machine.
         jobs: how many at once, None for one a processor; in real time, where it must not be busy, one for two.
         retry_failed: forget the attempts at matches that failed before.
-        on_progress: told how many matches are accounted for, and how many there are.
+        on_progress: called with how many matches are accounted for, and how many there are.
 
     Raises:
-        UsageError: ``out`` holds matches of another plan, or a worker does not see it.
+        UsageError: ``out`` holds matches of another schedule, or a worker does not see it.
         PlayError: there is no server, another process plays into ``out``, or the disk is full; what was played stays.
         StoreError: the store cannot be written.
         ClusterError: the connection to the executor's workers was lost.
@@ -120,7 +122,7 @@ def play(
     start = time.monotonic()
     out = out.resolve()
     if executor is None:
-        find_server(plan.fixtures[0].server)
+        find_server(schedule.fixtures[0].server)
     for folder in (out / MATCHES, out / FAILED):
         folder.mkdir(parents=True, exist_ok=True)
     lock = out / _LOCK
@@ -129,28 +131,24 @@ def play(
         stack.enter_context(held(lock, busy=PlayError(f"{out}: another process plays into it; wait for its end")))
         _clear(out / _PLAYING)
         stack.callback(_clear, out / _PLAYING)
-        # A folder of its own: workers that do not know yet that an earlier call is over may still write into theirs.
-        wanted = out / _PLAYING / uuid.uuid4().hex[:8] / "wanted"
-        wanted.parent.mkdir(parents=True)
-        wanted.touch()
+        wanted = _wanted(out)
         if retry_failed:
-            for fixture in plan.fixtures:
+            for fixture in schedule.fixtures:
                 shutil.rmtree(out / FAILED / fixture.id, ignore_errors=True)
-        known = {fixture.id: _known(fixture, plan.attempts, out) for fixture in plan.fixtures}
-        records = {name: record for name, record in known.items() if record is not None}
+        records = _known_records(schedule, out)
         stored = _Stored(out, store)
         stored.add([record for record in records.values() if record.complete])
         tasks = [
-            _Task(fixture=fixture, attempts=plan.attempts, out=out, wanted=wanted)
-            for fixture in plan.fixtures
+            _Task(fixture=fixture, attempts=schedule.attempts, out=out, wanted=wanted)
+            for fixture in schedule.fixtures
             if fixture.id not in records
         ]
-        on_progress(len(records), len(plan.fixtures))
+        on_progress(len(records), len(schedule.fixtures))
         if executor is None:
-            threads = jobs or max(1, available_cpus() // (1 if plan.fixtures[0].server.synch else 2))
+            threads = jobs or max(1, available_cpus() // (1 if schedule.fixtures[0].server.synch else 2))
             executor = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="match"))
         stop = partial(wanted.unlink, missing_ok=True)
-        stack.callback(stop)
+        stack.callback(stop)  # before the executor waits for its matches
         for task, result in run_tasks(_play_match, tasks, executor=executor, on_stop=stop):
             record = _lost(task) if isinstance(result, Died) else result
             records[task.fixture.id] = record
@@ -161,10 +159,10 @@ def play(
                 )
             with suppress(StoreError):  # busy, perhaps: tried again with the next match, and at the end
                 stored.add([record] if record.complete else [])
-            on_progress(len(records), len(plan.fixtures))
+            on_progress(len(records), len(schedule.fixtures))
         stored.add([])
     return PlayReport(
-        records=tuple(records[fixture.id] for fixture in plan.fixtures),
+        records=tuple(records[fixture.id] for fixture in schedule.fixtures),
         played=len(tasks),
         seconds=time.monotonic() - start,
     )
@@ -176,25 +174,42 @@ def _clear(playing: Path) -> None:
     shutil.rmtree(playing, ignore_errors=True)
 
 
+def _wanted(out: Path) -> Path:
+    """Make the file that is there as long as the matches are wanted.
+
+    It has a folder of its own: workers that do not know yet that an earlier call is over may still write into theirs.
+    """
+    wanted = out / _PLAYING / uuid.uuid4().hex[:8] / "wanted"
+    wanted.parent.mkdir(parents=True)
+    wanted.touch()
+    return wanted
+
+
+def _known_records(schedule: Schedule, out: Path) -> dict[str, Record]:
+    """Records of the matches that are not to be played, by id."""
+    known = {fixture.id: _known(fixture, schedule.attempts, out) for fixture in schedule.fixtures}
+    return {name: record for name, record in known.items() if record is not None}
+
+
 def _known(fixture: Fixture, attempts: int, out: Path) -> Record | None:
-    """The match, or the last of its attempts if there may be no more.
+    """Read the record of a match, or of its last attempt if there may be no more; None if it is to be played.
 
     Raises:
-        UsageError: what lies there was asked for otherwise.
+        UsageError: the match there was played otherwise than the schedule has it.
     """
     record = load_record(out / MATCHES / fixture.id)
     tries = _attempts(fixture, out)
     last = record or (tries[-1] if tries else None)
     if last is not None and last.fingerprint != fixture.fingerprint:
         raise UsageError(
-            f"{fixture.id}: was played in {out} with other commands, options or seed than the plan has now; "
+            f"{fixture.id}: was played in {out} with other commands, options or seed than the schedule has now; "
             "choose another --out, or remove this match there"
         )
     return record or (last if len(tries) >= attempts else None)
 
 
 def _attempts(fixture: Fixture, out: Path) -> list[Record]:
-    """Failed attempts, the first first."""
+    """Read the records of failed attempts, in their order."""
     folders = (out / FAILED / fixture.id).glob("*")
     found = [load_record(folder) for folder in sorted(folders, key=lambda folder: (len(folder.name), folder.name))]
     return [record for record in found if record is not None]
@@ -207,7 +222,7 @@ class _Stored:
         self._matches, self._store = out / MATCHES, store
         self._waiting: list[Record] = []
         if store is not None:
-            with store.writing():  # what cannot be written is told at once
+            with store.writing():  # a store that cannot be written fails at once
                 pass
 
     def add(self, records: Sequence[Record]) -> None:
@@ -223,7 +238,7 @@ class _Stored:
 
 
 def _play_match(task: _Task) -> Record:
-    """Runs in a thread, here or on a worker of a cluster: a match, in as many attempts as it takes.
+    """Play a match in as many attempts as it takes. Runs in a thread, here or on a worker of a cluster.
 
     Raises:
         UsageError: this machine does not see the folder, or the match is no longer wanted.
@@ -236,7 +251,7 @@ def _play_match(task: _Task) -> Record:
         )
     server = find_server(task.fixture.server)
     home = task.out / MATCHES / task.fixture.id
-    record: Record | None = load_record(home)  # of a worker that died before it could tell
+    record: Record | None = load_record(home)  # of a worker that died before it could answer
     for attempt in range(1 + len(_attempts(task.fixture, task.out)), 1 + task.attempts):
         if record is not None and record.complete:
             break
@@ -257,32 +272,32 @@ def _play_match(task: _Task) -> Record:
 
 
 def _attempt(order: Order, wanted: Path) -> Record:
-    """One attempt, by a keeper.
+    """Have a supervisor make one attempt.
 
     Raises:
         UsageError: the match is no longer wanted.
     """
-    with tempfile.TemporaryFile() as answer, (order.folder / "keeper.txt").open("wb") as errors:
-        keeper = subprocess.Popen(
+    with tempfile.TemporaryFile() as answer, (order.folder / "supervisor.txt").open("wb") as errors:
+        supervisor = subprocess.Popen(
             (sys.executable, "-P", "-m", "teamclone.play.supervisor"),
             stdin=subprocess.PIPE,
             stdout=answer,
             stderr=errors,
-            start_new_session=True,  # Ctrl-C is for us; we then ask the keepers
+            start_new_session=True,  # Ctrl-C is for us; the supervisors are then asked to stop
         )
-        assert keeper.stdin is not None
-        with keeper.stdin as order_stream:
+        assert supervisor.stdin is not None
+        with supervisor.stdin as order_stream:
             with suppress(BrokenPipeError):
                 order_stream.write(json.dumps(order.to_json()).encode() + b"\n")
                 order_stream.flush()
-            while keeper.poll() is None and wanted.exists():
+            while supervisor.poll() is None and wanted.exists():
                 with suppress(subprocess.TimeoutExpired):
-                    keeper.wait(_POLL_S)
+                    supervisor.wait(_POLL_S)
         try:
-            code = keeper.wait(_END_S)
+            code = supervisor.wait(_END_S)
         except subprocess.TimeoutExpired:
-            keeper.kill()
-            code = keeper.wait()
+            supervisor.kill()
+            code = supervisor.wait()
             kill_marked(order.folder)
         if code == STOPPED or not wanted.exists():
             raise UsageError(f"{order.fixture.id}: is no longer wanted")
@@ -290,11 +305,11 @@ def _attempt(order: Order, wanted: Path) -> Record:
         with suppress(ValueError, KeyError, TypeError):
             return Record.from_json(json.loads(answer.read()))
     kill_marked(order.folder)
-    words = (order.folder / "keeper.txt").read_text("utf-8", "replace").strip().splitlines()
+    words = (order.folder / "supervisor.txt").read_text("utf-8", "replace").strip().splitlines()
     text = (
         f"the process that looked after the match ended with code {code}: {words[-1] if words else 'it said nothing'}"
     )
-    record = _without_keeper(order.fixture, order.attempt, text)
+    record = _unsupervised(order.fixture, order.attempt, text)
     bury_logs(order.folder)
     save_record(order.folder, record)
     return record
@@ -302,7 +317,7 @@ def _attempt(order: Order, wanted: Path) -> Record:
 
 def _put(folder: Path, home: Path) -> None:
     """Rename a folder into place; another worker may have been quicker."""
-    (folder / "keeper.txt").unlink(missing_ok=True)
+    (folder / "supervisor.txt").unlink(missing_ok=True)
     try:
         folder.rename(home)
     except OSError as error:
@@ -316,17 +331,17 @@ def _put(folder: Path, home: Path) -> None:
 
 
 def _lost(task: _Task) -> Record:
-    return _without_keeper(task.fixture, task.attempts, "the workers that played it died; it is tried again next time")
+    return _unsupervised(task.fixture, task.attempts, "the workers that played it died; it is tried again next time")
 
 
-def _without_keeper(fixture: Fixture, attempt: int, text: str) -> Record:
+def _unsupervised(fixture: Fixture, attempt: int, text: str) -> Record:
     return Record(
         id=fixture.id,
         fingerprint=fixture.fingerprint,
         attempt=attempt,
         left=Side(team=fixture.left.name),
         right=Side(team=fixture.right.name),
-        trouble=Trouble(fault=Fault.KEEPER_DIED, text=text),
+        trouble=Trouble(fault=Fault.SUPERVISOR_DIED, text=text),
         machine=platform.node(),
         cpus=os.cpu_count() or 1,
     )

@@ -1,4 +1,4 @@
-"""What is to be played: teams, who plays whom how often, the server's options; from TOML, every mistake at once."""
+"""What is to be played: teams, pairings, the server's options; from TOML, with every mistake reported at once."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from teamclone.errors import UsageError, choose
+from teamclone.rcss.server_params import number
 from teamclone.system.files import digest
 from teamclone.system.settings import entries, fill
 
@@ -35,17 +36,17 @@ OPTIONS: Mapping[str, bool | int | float | str] = {
     "server::game_log_compression": 6,
     "server::text_log_compression": 6,
 }
-"""The server's options unless the plan says otherwise: those of the paper, and small logs."""
+"""The server's options unless the schedule says otherwise: those of the paper, and small logs."""
 
 OURS = (
     *("port", "coach_port", "olcoach_port", "auto_mode", "connect_wait", "coach", "team_l_start", "team_r_start"),
     *(f"{log}_log_{option}" for log in ("game", "text") for option in ("dir", "fixed", "dated")),
     *("game_logging", "text_logging"),
 )
-"""Options of the server that a plan may not set: by them a match is run."""
+"""Options of the server that a schedule may not set: by them a match is run."""
 
 OTHER_SECTIONS = ("store", "dataset", "train", "evaluate")
-"""Sections of a plan that are for `teamclone run`, see `pipeline`."""
+"""Sections of a schedule that are for `teamclone pipeline`, see `pipeline`."""
 
 MAX_FIXTURES = 100_000
 
@@ -64,8 +65,8 @@ class TeamSpec:
     No shell reads these commands; ``sh -c '...'`` is one. Each may hold the PLACEHOLDERS.
 
     Attributes:
-        name: what the plan calls it; the name that its players give the server may be another.
-        folder: where its commands run; the folder of the plan unless given.
+        name: what the schedule calls it; the name that its players give the server may be another.
+        folder: where its commands run; the folder of the schedule unless given.
         command: starts the whole team.
         start: a script as the league has them, called with host, folder and number once for each client: 1 is the
             goalkeeper, 12 the coach.
@@ -83,7 +84,7 @@ class TeamSpec:
     environment: dict[str, str] = field(default_factory=dict)
 
     def clients(self) -> list[tuple[str, list[str]]]:
-        """Label and words of each process to start: goalkeeper, players, coach; or the one that starts them all."""
+        """Return label and words of each process to start: goalkeeper, players, coach; or the one for all."""
         if self.command:
             return [("team", shlex.split(self.command))]
         numbers = [("goalie", 1), *((f"player-{unum}", unum) for unum in range(2, N_UNUMS + 1)), ("coach", COACH)]
@@ -111,21 +112,23 @@ class ServerSpec:
     command: str = "rcssserver"
     options: dict[str, Any] = field(default_factory=dict)
 
-    def number(self, name: str, default: float) -> float:
-        value = self.options.get(f"server::{name}", default)
-        return float(value) if isinstance(value, int | float) else default
+    def number(self, name: str) -> float:
+        """Return the value of an option, the server's default where it is not set."""
+        key = f"server::{name}"
+        return number({name: self.options[key]} if key in self.options else {}, name)
 
     @property
     def synch(self) -> bool:
+        """Whether the server waits for its clients in every cycle."""
         return self.options.get("server::synch_mode") is True
 
     @property
     def most_cycles(self) -> int:
-        """That a match may have, with all extra halves, roughly."""
-        regular = self.number("half_time", 300) * self.number("nr_normal_halfs", 2)
-        extra = self.number("extra_half_time", 100) * self.number("nr_extra_halfs", 2)
+        """The most cycles that a match may have, with all extra halves, roughly."""
+        regular = self.number("half_time") * self.number("nr_normal_halfs")
+        extra = self.number("extra_half_time") * self.number("nr_extra_halfs")
         shoot_out = 200 if self.options.get("server::penalty_shoot_outs") else 0
-        return int(1000 * (regular + extra + shoot_out) / max(self.number("simulator_step", 100), 1))
+        return int(1000 * (regular + extra + shoot_out) / max(self.number("simulator_step"), 1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +139,7 @@ class Limits:
         connect_s: from the start of a team to all its players being there.
         stall_s: without a sign of life of the server.
         match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10, and a few minutes.
-        silent_cycles: of a player on the field who sends nothing, after which he counts as hung; 0 is never.
+        silent_cycles: in a row without anything from a player on the field, who then counts as hung; 0 is never.
     """
 
     connect_s: float = 60.0
@@ -150,7 +153,7 @@ class Fixture:
     """One match to play.
 
     Attributes:
-        id: stable name of its folder; pairings that are added to a plan do not change it.
+        id: stable name of its folder; pairings that are added to a schedule do not change it.
         seed: of the heterogeneous player types. The server takes the seed of the game itself from its clock.
     """
 
@@ -163,26 +166,29 @@ class Fixture:
 
     @property
     def takes_port(self) -> bool:
+        """Whether both teams can play at another port than the default."""
         return self.left.takes_port and self.right.takes_port
 
     @property
     def match_s(self) -> float:
-        """The longest it may take."""
+        """The longest that the match may take, in seconds."""
         if self.limits.match_s:
             return self.limits.match_s
         return 4 * self.server.most_cycles / (25 if self.server.synch else 10) + 2 * self.limits.connect_s + 60
 
     @property
     def fingerprint(self) -> str:
-        """Says whether two fixtures ask for the same match; limits do not count."""
+        """A hash that is the same for fixtures that ask for the same match; limits do not count."""
         asked = [dataclasses.asdict(part) for part in (self.left, self.right, self.server)]
         return digest(json.dumps([asked, self.seed], sort_keys=True).encode())
 
     def to_json(self) -> dict[str, Any]:
+        """Return it as a JSON document holds it."""
         return dataclasses.asdict(self)
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Fixture:
+        """Make it of what `to_json` returned."""
         parts = {"left": TeamSpec, "right": TeamSpec, "server": ServerSpec, "limits": Limits}
         return cls(**{name: parts[name](**value) if name in parts else value for name, value in values.items()})
 
@@ -206,29 +212,29 @@ class PlaySettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
-    """All that a plan says about playing."""
+class Schedule:
+    """The matches to play, and how often each is tried before it counts as failed."""
 
     fixtures: tuple[Fixture, ...]
     attempts: int
 
 
-def load_plan(path: Path) -> Plan:
-    """A plan from a TOML file.
+def load_schedule(path: Path) -> Schedule:
+    """Read a schedule from a TOML file.
 
     Raises:
         UsageError: naming all that is wrong, in one line.
     """
-    return plan_from(read_plan(path), where=str(path), base=folder_of(path))
+    return schedule_from(read_schedule(path), where=str(path), base=folder_of(path))
 
 
 def folder_of(path: Path) -> Path:
-    """Of a plan, from which its paths go."""
+    """Return the folder of a schedule's file, to which its paths are relative."""
     return Path(os.path.normpath(path.absolute().parent))
 
 
-def read_plan(path: Path) -> dict[str, Any]:
-    """The tables of a plan.
+def read_schedule(path: Path) -> dict[str, Any]:
+    """Read the tables of a schedule.
 
     Raises:
         UsageError: the file is not TOML.
@@ -239,8 +245,8 @@ def read_plan(path: Path) -> dict[str, Any]:
         raise UsageError(f"{path}: is not TOML: {error}") from None
 
 
-def quick_plan(left: str, right: str, *, matches: int, server: str, options: Mapping[str, Any]) -> Plan:
-    """The plan of two teams, each a command that starts it, or a folder with the league's ``start`` script.
+def quick_schedule(left: str, right: str, *, matches: int, server: str, options: Mapping[str, Any]) -> Schedule:
+    """Make the schedule of two teams, each a command that starts it, or a folder with the league's ``start`` script.
 
     Raises:
         UsageError: naming all that is wrong, in one line.
@@ -264,11 +270,11 @@ def quick_plan(left: str, right: str, *, matches: int, server: str, options: Map
         "teams": teams,
         "pairings": [{"left": first, "right": second, "matches": matches}],
     }
-    return plan_from(table, where="teamclone play", base=Path.cwd())
+    return schedule_from(table, where="teamclone play", base=Path.cwd())
 
 
-def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
-    """A plan from its tables; folders are relative to ``base``.
+def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedule:
+    """Make a schedule of its tables; folders are relative to ``base``.
 
     Raises:
         UsageError: naming all that is wrong, in one line.
@@ -311,7 +317,7 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
             if strange or left == right:
                 continue
             if len(fixtures) + pairing.matches > MAX_FIXTURES:
-                problems.append(f"{key}: more than {MAX_FIXTURES} matches in one plan")
+                problems.append(f"{key}: more than {MAX_FIXTURES} matches in one schedule")
                 continue
             for _ in range(pairing.matches):
                 count = counts[left, right] = counts.get((left, right), 0) + 1
@@ -340,22 +346,22 @@ def plan_from(table: Mapping[str, Any], *, where: str, base: Path) -> Plan:
     problems += [f"{name}: names two matches; call one of their teams otherwise" for name in twice]
     if problems:
         raise UsageError(f"{where}: {'; '.join(dict.fromkeys(problems))}")
-    return Plan(fixtures=tuple(fixtures), attempts=settings.attempts)
+    return Schedule(fixtures=tuple(fixtures), attempts=settings.attempts)
 
 
 def option_words(options: Mapping[str, Any]) -> Iterator[str]:
-    """Options as the server's command line takes them."""
+    """Yield options as the server's command line takes them."""
     for name, value in options.items():
         yield f"{name}={('off', 'on')[value] if isinstance(value, bool) else value}"
 
 
 def filled_in(words: list[str], values: Mapping[str, Any]) -> list[str]:
-    """The words of a command with its placeholders replaced."""
+    """Return the words of a command with its placeholders replaced."""
     return [_PLACEHOLDER.sub(lambda found: str(values[found[1]]), word) for word in words]
 
 
 def _wrong(team: TeamSpec) -> list[str]:
-    """What is wrong with a team's commands."""
+    """Find what is wrong with a team's commands."""
     problems = []
     if not _NAME.fullmatch(team.name):
         problems.append("a name is made of at most 40 letters, digits, '_', '.', '+' and '-'")
@@ -393,7 +399,7 @@ def _wrong(team: TeamSpec) -> list[str]:
 
 
 def _options(given: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
-    """The server's options under their full names, with those that we set unless told otherwise."""
+    """Return the server's options under their full names, with ours where the schedule has none."""
     options = dict(OPTIONS)
     switches = {"on": True, "true": True, "off": False, "false": False}
     for name, text in given.items():
@@ -415,7 +421,7 @@ def _options(given: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
 
 
 def _path(text: str, base: Path, key: str, problems: list[str]) -> str:
-    """A path from ``base``, with ``~`` and ``..`` resolved, but no links."""
+    """Return a path from ``base``, with ``~`` and ``..`` resolved, but no links."""
     try:
         return os.path.normpath(base / Path(text).expanduser())
     except RuntimeError as error:  # of ~somebody

@@ -28,7 +28,7 @@ _NO_SOCKET = "Error initializing sockets"
 
 
 def find_server(server: ServerSpec) -> Path:
-    """The server's program.
+    """Find the server's program.
 
     Raises:
         PlayError: there is none.
@@ -43,7 +43,7 @@ def find_server(server: ServerSpec) -> Path:
 
 
 def server_words(program: Path, fixture: Fixture, *, port: int) -> list[str]:
-    """The command that starts the server of a match; its logs go where it is started."""
+    """Return the command that starts the server of a match; its logs go where it is started."""
     wait = int(2 * CONNECT_CYCLES_PER_S * fixture.limits.connect_s) + 400  # we give up before the server does
     ours: dict[str, Any] = {
         "server::port": port,
@@ -60,12 +60,12 @@ def server_words(program: Path, fixture: Fixture, *, port: int) -> list[str]:
 
 
 def server_environment(folder: Path) -> dict[str, str]:
-    """Keeps the settings of the user, in his home or by variable, out of a match."""
+    """Return variables that keep the user's own settings, in the home folder or by variable, out of a match."""
     return {"RCSS_CONF_DIR": str(folder), "HOME": str(folder)}
 
 
 def server_report(output: str) -> dict[str, Any]:
-    """What a server's output says of it: version, seed of the game, cycles that it waited for clients in vain."""
+    """Read a server's output: version, seed of the game, cycles that it waited for clients in vain."""
     version, seed = _VERSION.search(output), _SEED.search(output)
     return {
         "version": version and version[1],
@@ -75,23 +75,24 @@ def server_report(output: str) -> dict[str, Any]:
 
 
 def gave_up(output: str) -> bool:
-    """Whether the server stopped because clients did not answer."""
+    """Return whether the server stopped because clients did not answer."""
     return _GAVE_UP in output
 
 
 def met_taken_port(output: str) -> bool:
+    """Return whether the server could not open its ports."""
     return _NO_SOCKET in output
 
 
 def last_words(output: str) -> str:
-    """The last line that speaks of an error, else the last that says something."""
+    """Return the last line that speaks of an error, else the last that says something."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     errors = [line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)]
     return (errors or lines or ["it said nothing"])[-1][:200]
 
 
 def hashes(paths: Iterable[Path]) -> dict[str, str]:
-    """SHA-256 of files that can be read, by their path."""
+    """Return the SHA-256 of files that can be read, by their path."""
     found = {}
     for path in sorted(set(paths)):
         with suppress(OSError), path.open("rb") as file:
@@ -100,7 +101,7 @@ def hashes(paths: Iterable[Path]) -> dict[str, str]:
 
 
 def programs_of(folder: Path, commands: Iterable[list[str]]) -> list[Path]:
-    """The files that say which version of a team played: those its commands name, and the programs in its folder."""
+    """Find the files that say which version of a team played: those it names, and its folder's programs."""
     found = []
     for program, *others in commands:
         named = folder / program if "/" in program else Path(shutil.which(program) or program)

@@ -1,8 +1,8 @@
 """The process that looks after one match: has it played, reads its logs, says what came of it.
 
 Run as ``python -m teamclone.play.supervisor``, with an `Order` as JSON in a line on standard input, which then stays
-open: its end is the request to stop, so that a keeper ends with who asked for the match. The `Record` goes to standard
-output.
+open: its end is the request to stop, so that a supervisor ends with the process that asked for the match. The `Record`
+goes to standard output.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import Any, Self
 
 from teamclone import __version__
 from teamclone.logs.match import Match
-from teamclone.play.game import SIDES, FailedError, Game, StoppedError
+from teamclone.play.game import SIDES, Game, StoppedError
 from teamclone.play.holes import Holes
 from teamclone.play.processes import adopt_orphans
-from teamclone.play.record import Fault, Record, Side, Trouble, bury_logs, save_record
+from teamclone.play.record import FailedError, Fault, Record, Side, Trouble, bury_logs, save_record
 from teamclone.play.schedule import N_UNUMS, Fixture
 from teamclone.play.server import gave_up, hashes, programs_of, server_report
 from teamclone.play.verdict import read_logs, verdict
 
 STOPPED = 3
-"""Exit code of a keeper that was asked to stop."""
+"""Exit code of a supervisor that was asked to stop."""
 
 FULL = 1 << 20
 """If fewer bytes than this can be written, what went wrong is the disk's fault."""
@@ -46,6 +46,7 @@ class Order:
     attempt: int
 
     def to_json(self) -> dict[str, Any]:
+        """Return it as a JSON document holds it."""
         return {
             "fixture": self.fixture.to_json(),
             "folder": str(self.folder),
@@ -55,6 +56,7 @@ class Order:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
+        """Make it of what `to_json` returned."""
         return cls(
             fixture=Fixture.from_json(values["fixture"]),
             folder=Path(values["folder"]),
@@ -63,11 +65,11 @@ class Order:
         )
 
 
-def keep(order: Order) -> Record:
-    """Play a match as ordered and say what came of it; nothing of it runs afterwards.
+def supervise(order: Order) -> Record:
+    """Play a match as ordered and return what came of it; nothing of it runs afterwards.
 
     Raises:
-        StoppedError: it was asked to stop.
+        StoppedError: the match is no longer wanted.
     """
     began, now = time.monotonic(), datetime.now(UTC)
     game = Game(order.fixture, folder=order.folder, program=order.server)
@@ -77,7 +79,7 @@ def keep(order: Order) -> Record:
     except FailedError as error:
         failed = error
     except OSError as error:  # of our own files
-        failed = FailedError(Fault.DISK_FULL if _is_full(order.folder) else Fault.KEEPER_DIED, f"{error}")
+        failed = FailedError(Fault.DISK_FULL if _is_full(order.folder) else Fault.SUPERVISOR_DIED, f"{error}")
     finally:
         exits = game.finish(failed=failed is not None)
     match, holes, problem = read_logs(order.folder)
@@ -107,7 +109,7 @@ def _record(
     exits: dict[str, dict[str, int | None]],
 ) -> Record:
     fixture, output = order.fixture, game.server_output()
-    cycle = game.scene.cycle if game.scene else None
+    cycle = game.show.cycle if game.show else None
     sides = []
     for side, team in enumerate(game.teams):
         played = None if match is None else (match.left, match.right)[side]
@@ -120,7 +122,7 @@ def _record(
         sides.append(
             Side(
                 team=team.name,
-                name=played.name if played else game.scene.names[side] if game.scene else None,
+                name=played.name if played else game.show.names[side] if game.show else None,
                 score=played.score if played else 0,
                 files=hashes(programs_of(Path(team.folder), commands)),
                 exits=exits[SIDES[side]],
@@ -155,7 +157,7 @@ def _record(
 
 
 def _is_full(folder: Path) -> bool:
-    """Tried, since quotas count, too."""
+    """Return whether the disk is full. It is tried, since quotas count, too."""
     test = folder / "room"
     try:
         test.write_bytes(bytes(FULL))
@@ -167,13 +169,14 @@ def _is_full(folder: Path) -> bool:
 
 
 def _make_last(folder: Path) -> None:
-    """Have the logs on disk before the match is said to be whole."""
+    """Have the logs on disk before the match counts as complete."""
     for path in folder.glob("*.rc[gl]*"):
         with path.open("rb") as file:
             os.fsync(file.fileno())
 
 
 def main() -> None:
+    """Read an order, carry it out, and print the record."""
     line = b""
     while not line.endswith(b"\n"):  # byte by byte: a buffer would hide the end of the stream
         line += os.read(0, 1) or b"\n"
@@ -182,7 +185,7 @@ def main() -> None:
     adopt_orphans()
     order = Order.from_json(json.loads(line))
     try:
-        record = keep(order)
+        record = supervise(order)
     except StoppedError:
         sys.exit(STOPPED)
     try:

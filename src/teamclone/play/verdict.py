@@ -1,4 +1,4 @@
-"""What the logs of a match say of it: whole or not, and who was missing."""
+"""Whether the logs of a match are whole, and which players were missing or silent."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from teamclone.errors import TeamcloneError
 from teamclone.logs import find_matches, read_pair
 from teamclone.logs.match import Match, Severity
-from teamclone.play.game import FailedError, who
 from teamclone.play.holes import Holes, count_holes
-from teamclone.play.record import Fault
+from teamclone.play.record import FailedError, Fault, who
 from teamclone.play.schedule import N_UNUMS, Fixture
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.rcss.server_params import number
 
 
 def read_logs(folder: Path) -> tuple[Match | None, Holes | None, str | None]:
-    """The match in a folder with its holes, and what is wrong with it."""
+    """Read the match in a folder: it, its holes, and what is wrong with it; None for each that there is not."""
     try:
         pairs = find_matches([folder])
         if len(pairs) != 1 or pairs[0].rcg is None or pairs[0].rcl is None:
@@ -35,10 +35,10 @@ def read_logs(folder: Path) -> tuple[Match | None, Holes | None, str | None]:
 def verdict(
     fixture: Fixture, match: Match | None, holes: Holes | None, problem: str | None, *, gave_up: bool
 ) -> FailedError | None:
-    """What speaks against a match whose server ended by itself; None where nothing does.
+    """Judge a match whose server ended by itself: what speaks against it; None where nothing does.
 
     Args:
-        gave_up: the server said that it waited for clients in vain. After the end of a match that does not matter.
+        gave_up: whether the server waited for clients in vain. After the end of a match that does not matter.
     """
     if match is None or holes is None or problem:
         return FailedError(Fault.BAD_LOGS, problem or "the game log has no frame")
@@ -60,18 +60,14 @@ def verdict(
 
 
 def _cycles(match: Match) -> int:
-    """Of the regular halves, as the server counts them (`serverparam.cpp`)."""
-
-    def number(name: str, usual: float) -> float:
-        value = match.game.server_params.get(name, usual)
-        return value if isinstance(value, float) else usual
-
-    per_half = int(number("half_time", 300) * 1000 / number("simulator_step", 100) + 0.5)
-    return per_half * int(number("nr_normal_halfs", 2))
+    """Return how many cycles the regular halves have, as the server counts them (`serverparam.cpp`)."""
+    params = match.game.server_params
+    per_half = int(number(params, "half_time") * 1000 / number(params, "simulator_step") + 0.5)
+    return per_half * int(number(params, "nr_normal_halfs"))
 
 
 def _blame(fixture: Fixture, flags: NDArray[np.bool_], fault: Fault, text: str) -> FailedError | None:
-    """The first team with such players."""
+    """Blame the first team that has such players."""
     for side, team in enumerate((fixture.left, fixture.right)):
         unums = [1 + int(index) for index in np.flatnonzero(flags[side * N_UNUMS : (side + 1) * N_UNUMS])]
         if unums:

@@ -1,1 +1,1 @@
-"""What rcssserver and its clients send each other."""
+"""The protocols of rcssserver: messages as bytes and columns, and the sockets that carry them."""

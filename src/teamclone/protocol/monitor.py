@@ -1,112 +1,121 @@
-"""What the server tells monitors: who is there, the play mode, the time. So a match is watched without its logs.
+"""The monitor protocol of rcssserver: datagrams to columns, requests to bytes. No socket and no decision is here.
 
-Protocol version 3 of rcssserver (`dispsender.cpp`, `serializermonitor.cpp`), which servers since 12.1 speak. In
-synchronous mode the server pauses for monitors, 20 ms in 32 cycles, so one looks in only now and then when it can.
+Written after `monitor.cpp` and `serializermonitor.cpp`. A request asks for a text version: 3, which servers since 12.1
+speak, 4 and 5. Monitors of different versions that watch one match may get each other's records, so `show_of` reads all
+three. A datagram is never trusted: whatever is not one whole record is None, and costs no more than its length.
 """
 
 from __future__ import annotations
 
 import re
-import socket
-import time
-from contextlib import suppress
 from dataclasses import dataclass
+from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.logs import scan
+from teamclone.logs.match import Columns
+from teamclone.logs.shows import Shows, read_shows
 from teamclone.rcss.playmodes import PlayMode
 
-_HEAD = re.compile(rb"\(show (\d+) \(pm (\d+)\) \(tm (\S+) (\S+) (\d+) (\d+)")
-_PLAYER = re.compile(rb"\(\(([lr]) (\d+)\) -?\d+ (0x[0-9a-f]+|0) ")
-_MAX_BYTES = 16_384
-_ASK_S = 0.3
-"""Between two requests to a server that is not up yet."""
+MAX_BYTES = 16_384
+"""Of a datagram that is read; a record has about 3,400."""
+
+_HEAD = re.compile(rb"\(show \d{1,10} \(pm (\d{1,3})\) \(tm ([^\s()]{1,64}) ([^\s()]{1,64}) (\d{1,5}) (\d{1,5})[ )]")
+"""What monitors get and logs have in records of their own: play mode, names and scores."""
+_PLACE_SCALE = 16
+"""Positions in requests are whole sixteenths of a metre."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Show:
     """One cycle as a monitor sees it.
 
     Attributes:
+        playmode: its number, one of `PlayMode` unless the server is newer.
         names: of the left and the right team; None where none has come.
-        present: numbers of the connected players of each side.
+        scores: of the left and the right team.
+        ball: (4,) float32: x, y in metres, vx, vy in metres per cycle.
+        players: the columns `columns.PLAYERS`, (22,) each: left 1 to 11, then right 1 to 11.
     """
 
     cycle: int
     playmode: int
     names: tuple[str | None, str | None]
     scores: tuple[int, int]
-    present: tuple[frozenset[int], frozenset[int]]
+    ball: NDArray[np.float32]
+    players: Columns
 
     @property
     def over(self) -> bool:
+        """Whether the match has ended."""
         return self.playmode == PlayMode.TIME_OVER
 
     @property
     def begun(self) -> bool:
+        """Whether the clock runs already."""
         return self.cycle > 0
 
+    @property
+    def present(self) -> tuple[frozenset[int], frozenset[int]]:
+        """Numbers of the connected players of the left and of the right team; those sent off are among them."""
+        left, right = (self.players["state"] != 0).reshape(2, -1)
+        return (
+            frozenset((np.flatnonzero(left) + 1).tolist()),
+            frozenset((np.flatnonzero(right) + 1).tolist()),
+        )
 
-def scene_of(packet: bytes) -> Scene | None:
-    """The scene in a packet; None where it is of another kind."""
-    head = _HEAD.match(packet)
+
+def show_of(datagram: bytes) -> Show | None:
+    """Read the record of a cycle; None where the datagram is something else, damaged, cut off or over MAX_BYTES."""
+    if len(datagram) > MAX_BYTES:
+        return None
+    text = datagram.partition(b"\0")[0]
+    head = _HEAD.match(text)
     if head is None:
         return None
-    present: tuple[set[int], set[int]] = (set(), set())
-    for side, unum, state in _PLAYER.findall(packet):
-        if int(state, 16):
-            present[side == b"r"].add(int(unum))
-    names = [None if name == b"null" else name.decode("ascii", "replace") for name in head.group(3, 4)]
-    return Scene(
-        cycle=int(head[1]),
-        playmode=int(head[2]),
-        names=(names[0], names[1]),
-        scores=(int(head[5]), int(head[6])),
-        present=(frozenset(present[0]), frozenset(present[1])),
+    shows = _read(text, 1)
+    if shows.outcomes[0] != scan.OK:
+        return None
+    left, right = (None if name == b"null" else name.decode("ascii", "replace") for name in head.group(2, 3))
+    return Show(
+        cycle=int(shows.cycle[0]),
+        playmode=int(head[1]),
+        names=(left, right),
+        scores=(int(head[4]), int(head[5])),
+        ball=shows.ball[0],
+        players={name: column[0] for name, column in shows.players.items()},
     )
 
 
-class Monitor:
-    """A connection to a server on this machine.
+def load_reader() -> None:
+    """Load what `show_of` needs. It is compiled when it is first used, so call this before time matters."""
+    _read(b" ", 0)
 
-    Attributes:
-        rest_s: how long to be away once something was seen; 0 stays.
+
+def _read(text: bytes, n: int) -> Shows:
+    """Read a text that is ``n`` records, 0 or 1."""
+    return read_shows(np.frombuffer(text, np.uint8), np.zeros(n, np.int64), np.full(n, len(text), np.int64))
+
+
+def init(version: Literal[3, 4, 5] = 3) -> bytes:
+    """Make the request to become a monitor; it goes to the server's port, the answers come from another."""
+    return b"(dispinit version %d)\0" % version
+
+
+def bye() -> bytes:
+    """Make the request to be a monitor no longer; it goes to the port that the answers come from."""
+    return b"(dispbye)\0"
+
+
+def place_player(side: Literal[1, -1], unum: int, *, x: float, y: float, body: float) -> bytes:
+    """Make the request to put a player, standing, at a place. The server obeys it in every play mode.
+
+    Args:
+        side: 1 left, -1 right.
+        x, y: metres, rounded to a sixteenth.
+        body: degrees, rounded to a whole one.
     """
-
-    def __init__(self, port: int) -> None:
-        self.rest_s = 0.0
-        self._there, self._ask_at = False, 0.0
-        self._server = ("127.0.0.1", port)
-        self._served_at = self._server  # the server answers each monitor from a port of its own
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
-        self._socket.setblocking(False)
-
-    def latest(self) -> Scene | None:
-        """The newest scene that has come since the last call; None where none has. Never waits."""
-        packet = None
-        while True:
-            try:
-                data, address = self._socket.recvfrom(_MAX_BYTES)
-            except BlockingIOError:
-                break
-            except ConnectionError:  # an earlier question met no server
-                continue
-            if data.startswith(b"(show "):
-                packet, self._served_at = data, address
-        now = time.monotonic()
-        self._there = self._there or packet is not None
-        if self._there and self.rest_s:
-            self._send(b"(dispbye)", self._served_at)
-            self._there, self._ask_at = False, now + self.rest_s
-        elif not self._there and now >= self._ask_at:
-            self._send(b"(dispinit version 3)", self._server)
-            self._ask_at = now + _ASK_S
-        return None if packet is None else scene_of(packet)
-
-    def close(self) -> None:
-        """Leave for good."""
-        self._send(b"(dispbye)", self._served_at)
-        self._socket.close()
-
-    def _send(self, message: bytes, address: tuple[str, int]) -> None:
-        with suppress(OSError):
-            self._socket.sendto(message + b"\0", address)
+    place = tuple(round(_PLACE_SCALE * value) for value in (x, y))
+    return b"(dispplayer %d %d %d %d %d)\0" % (side, unum, *place, round(body))

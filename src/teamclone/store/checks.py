@@ -142,7 +142,7 @@ CHECKS = (
     ),
     Check(
         name="player-speed",
-        about="no player is faster than his type",
+        about="no player is faster than its type allows",
         sql=f"select cycle, concat({_PLAYER}, ' has velocity ', vx, ', ', vy) as what from player_states "
         "join frames using (match_id, frame) join player_types using (match_id, type) "
         f"where {_ON_FIELD} and sqrt(vx ** 2 + vy ** 2) > player_speed_max + {_SLACK} order by frame",

@@ -470,7 +470,7 @@ class PostgresStore:
         if state == "53100":
             return StoreError(f"{shown}: the server's disk is full; make room and ingest again, what is there stays")
         if state == "42501":
-            return StoreError(f"{shown}: {told}; docs/postgresql.md lists the rights that a user needs")
+            return StoreError(f"{shown}: {told}; docs/howto/postgresql.md lists the rights that a user needs")
         return StoreError(f"{shown}: {told}")
 
 
@@ -483,7 +483,7 @@ def _rows(cursor: dbapi.Cursor, query: str, *values: str | None) -> list[dict[st
 def _trust_keys(cursor: dbapi.Cursor) -> None:
     """Where the user may, let this transaction skip the check that each row's match exists: it just wrote the match.
 
-    The check is one query a row and costs as much as all the rest (docs/postgresql.md).
+    The check is one query a row and costs as much as all the rest (docs/howto/postgresql.md).
     """
     _rows(
         cursor,
@@ -551,7 +551,7 @@ def _remedy(told: str) -> str:
         ('database "', "make it with `createdb`, or name another"),
         ("host name", "check the host"),
         ("too many", "allow more connections, or use fewer --jobs"),
-        ("invalid", "see docs/postgresql.md for the form of the URL"),
+        ("invalid", "see docs/howto/postgresql.md for the form of the URL"),
     ):
         if sign in told:
             return f"; {remedy}"

@@ -204,7 +204,7 @@ TYPE_FIELDS = {
     "effort_max": ("", "highest dash efficiency"),
     "effort_min": ("", "lowest dash efficiency"),
     "kick_power_rate": ("m/cycle²", "ball acceleration of one unit of kick power"),
-    "foul_detect_probability": ("", "probability that the referee sees a foul of his"),
+    "foul_detect_probability": ("", "probability that the referee sees a foul of the player"),
     "catchable_area_l_stretch": ("", "how far a goalkeeper's reach stretches, as a factor"),
 }
 """Unit and meaning of ``player_types.FIELDS``."""
@@ -350,17 +350,17 @@ def create_fixed(table: Table) -> str:
 
 
 def markdown() -> str:
-    """The page `docs/data-model.md`; a test holds the file to it."""
+    """Return the page `docs/reference/data-model.md`; `docs/generate.py` writes it."""
     lines = [
         "# Data model",
         "",
-        "<!-- Written by `teamclone.store.schema.markdown()`; `python -m` prints it, a test compares. -->",
+        "<!-- Written by docs/generate.py from teamclone.store.schema. -->",
         "",
         "The tables of a store, for `teamclone sql` and for any reader of its Parquet files or of `store.duckdb`.",
-        "What differs in a database server is said in [postgresql.md](postgresql.md).",
-        "Positions are in metres in the server's frame: origin at the centre spot, +x towards the goal that the left",
-        "team attacks, +y downwards on a monitor, angles in degrees from +x towards +y. Nothing is mirrored for the",
-        "right team.",
+        "[PostgreSQL](../howto/postgresql.md) has the differences in a database server.",
+        "Positions are in metres in the [server's frame](../explanation/frame-of-reference.md): origin at the centre",
+        "spot, +x towards the goal that the left team attacks, +y downwards on a monitor, angles in degrees from +x",
+        "towards +y. Nothing is mirrored for the right team.",
         "A value that the log does not hold is NULL wherever the text says NaN; the NumPy readers return NaN.",
         f"This is format {FORMAT}.",
         "",
@@ -387,7 +387,3 @@ def markdown() -> str:
         if entry.rows:
             lines += [", ".join(f"{number} `{word}`" if word else f"{number}" for number, word in entry.rows) + ".", ""]
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(markdown(), end="")

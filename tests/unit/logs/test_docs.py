@@ -11,14 +11,14 @@ import pytest
 from teamclone.logs import Match
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGE = (ROOT / "docs" / "logs.md").read_text()
+PAGE = (ROOT / "docs" / "reference" / "logs.md").read_text()
 
 
 def test_the_code_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     monkeypatch.chdir(ROOT)
     names: dict[str, object] = {}
     for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
-        exec(compile(block, "docs/logs.md", "exec"), names)
+        exec(compile(block, "docs/reference/logs.md", "exec"), names)
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == "HELIOS_base 8 - 0 WEBase"
     assert printed[-1] == "b'ULG5'"

@@ -1,4 +1,4 @@
-"""From a plan's TOML to matches to play, and every mistake in it at once."""
+"""From a schedule's TOML to matches to play, and every mistake in it at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from teamclone.errors import UsageError
-from teamclone.play.schedule import Fixture, filled_in, load_plan, option_words, plan_from, quick_plan
+from teamclone.play.schedule import Fixture, filled_in, load_schedule, option_words, quick_schedule, schedule_from
 
 TEAMS = {
     "Red": {"command": "red --port {port}"},
@@ -18,13 +18,13 @@ TEAMS = {
 }
 
 
-def plan(folder: Path, *pairings: dict[str, Any], **sections: Any) -> tuple[Fixture, ...]:
+def fixtures_of(folder: Path, *pairings: dict[str, Any], **sections: Any) -> tuple[Fixture, ...]:
     table = {"teams": TEAMS, "pairings": list(pairings), **sections}
-    return plan_from(table, where="plan", base=folder).fixtures
+    return schedule_from(table, where="schedule", base=folder).fixtures
 
 
 def test_every_left_team_meets_every_right_one_and_numbers_go_on(tmp_path: Path) -> None:
-    made = plan(
+    made = fixtures_of(
         tmp_path,
         {"left": ["Red", "Blue"], "right": "Old", "matches": 2},
         {"left": "Red", "right": "Blue", "swap": True},
@@ -43,13 +43,13 @@ def test_every_left_team_meets_every_right_one_and_numbers_go_on(tmp_path: Path)
 
 
 def test_a_pairing_that_is_added_leaves_the_other_matches_as_they_were(tmp_path: Path) -> None:
-    one = plan(tmp_path, {"left": "Red", "right": "Blue"})
-    more = plan(tmp_path, {"left": "Old", "right": "Blue"}, {"left": "Red", "right": "Blue", "matches": 2})
+    one = fixtures_of(tmp_path, {"left": "Red", "right": "Blue"})
+    more = fixtures_of(tmp_path, {"left": "Old", "right": "Blue"}, {"left": "Red", "right": "Blue", "matches": 2})
     assert one[0] == more[1]
 
 
 def test_the_paper_s_options_are_the_default_and_may_be_changed(tmp_path: Path) -> None:
-    [fixture] = plan(
+    [fixture] = fixtures_of(
         tmp_path, {"left": "Red", "right": "Blue"}, server={"options": {"half_time": 5, "synch_mode": False}}
     )
     words = list(option_words(fixture.server.options))
@@ -62,7 +62,7 @@ def test_the_paper_s_options_are_the_default_and_may_be_changed(tmp_path: Path) 
 
 
 def test_a_team_is_started_as_its_kind_says(tmp_path: Path) -> None:
-    [fixture] = plan(tmp_path, {"left": "Blue", "right": "Old"})
+    [fixture] = fixtures_of(tmp_path, {"left": "Blue", "right": "Old"})
     blue, old = fixture.left.clients(), fixture.right.clients()
     assert [label for label, _ in blue] == ["goalie", *(f"player-{unum}" for unum in range(2, 12)), "coach"]
     assert blue[0][1] == ["g", "{port}"]
@@ -79,17 +79,17 @@ def test_placeholders_are_filled_in_and_no_shell_reads_them() -> None:
 
 
 def test_a_fixture_survives_json(tmp_path: Path) -> None:
-    [fixture] = plan(tmp_path, {"left": "Blue", "right": "Red"})
+    [fixture] = fixtures_of(tmp_path, {"left": "Blue", "right": "Red"})
     assert Fixture.from_json(fixture.to_json()) == fixture
     assert Fixture.from_json(fixture.to_json()).fingerprint == fixture.fingerprint
 
 
 def test_the_fingerprint_tells_what_was_asked_for_but_not_how_long_one_waits(tmp_path: Path) -> None:
     pairing = {"left": "Blue", "right": "Red"}
-    [base] = plan(tmp_path, pairing)
-    [patient] = plan(tmp_path, pairing, limits={"connect_s": 5})
-    [other] = plan(tmp_path, pairing, server={"options": {"half_time": 5}})
-    [seeded] = plan(tmp_path, pairing, play={"seed": 4})
+    [base] = fixtures_of(tmp_path, pairing)
+    [patient] = fixtures_of(tmp_path, pairing, limits={"connect_s": 5})
+    [other] = fixtures_of(tmp_path, pairing, server={"options": {"half_time": 5}})
+    [seeded] = fixtures_of(tmp_path, pairing, play={"seed": 4})
     assert base.fingerprint == patient.fingerprint
     assert len({base.fingerprint, other.fingerprint, seeded.fingerprint}) == 3
 
@@ -109,11 +109,11 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
         "severs": {},
     }
     with pytest.raises(UsageError) as caught:
-        plan_from(table, where="my plan", base=tmp_path)
+        schedule_from(table, where="my schedule", base=tmp_path)
     text = str(caught.value)
     assert "\n" not in text
     for part in (
-        "my plan: ",
+        "my schedule: ",
         "no section 'severs'; did you mean server?",
         "teams.Red: needs one of command (the whole team), start (the league's script) and player, got command and",
         "no setting teams.Blue.foldr; did you mean folder?",
@@ -135,29 +135,29 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
         assert part in text, part
 
 
-def test_folders_are_relative_to_the_plan(tmp_path: Path) -> None:
+def test_folders_are_relative_to_the_schedule(tmp_path: Path) -> None:
     (tmp_path / "red").mkdir()
-    path = tmp_path / "plan.toml"
+    path = tmp_path / "schedule.toml"
     path.write_text(
         "[teams.Red]\nfolder = 'red'\ncommand = 'r {port}'\n[teams.Blue]\ncommand = 'b {port}'\n"
         "[[pairings]]\nleft = 'Red'\nright = 'Blue'\n"
     )
-    [fixture] = load_plan(path).fixtures
+    [fixture] = load_schedule(path).fixtures
     assert fixture.left.folder == str(tmp_path / "red")
     assert fixture.right.folder == str(tmp_path)
 
 
 def test_what_is_not_toml_is_told_with_its_place(tmp_path: Path) -> None:
-    path = tmp_path / "plan.toml"
+    path = tmp_path / "schedule.toml"
     path.write_text("[teams\n")
-    with pytest.raises(UsageError, match=r"plan\.toml: is not TOML: .*line 1"):
-        load_plan(path)
+    with pytest.raises(UsageError, match=r"schedule\.toml: is not TOML: .*line 1"):
+        load_schedule(path)
 
 
 def test_the_quick_case_takes_commands_and_folders_with_a_start_script(tmp_path: Path) -> None:
     (tmp_path / "league").mkdir()
     (tmp_path / "league" / "start").touch()
-    made = quick_plan("red -p {port}", str(tmp_path / "league"), matches=2, server="srv", options={"half_time": 3})
+    made = quick_schedule("red -p {port}", str(tmp_path / "league"), matches=2, server="srv", options={"half_time": 3})
     assert [fixture.id for fixture in made.fixtures] == ["left-vs-league-1", "left-vs-league-2"]
     assert made.fixtures[0].right.start == "./start"
     assert made.fixtures[0].server.command == "srv"
@@ -169,7 +169,7 @@ def test_the_quick_case_tells_two_copies_of_a_team_apart(tmp_path: Path) -> None
         (tmp_path / name / "team").mkdir(parents=True)
         (tmp_path / name / "team" / "start").touch()
     folders = [str(tmp_path / name / "team") for name in ("a", "b")]
-    [fixture] = quick_plan(*folders, matches=1, server="srv", options={}).fixtures
+    [fixture] = quick_schedule(*folders, matches=1, server="srv", options={}).fixtures
     assert fixture.id == "team-vs-team-2-1"
     assert fixture.right.folder == folders[1]
 
@@ -210,7 +210,7 @@ def test_the_quick_case_tells_two_copies_of_a_team_apart(tmp_path: Path) -> None
 def test_what_would_fail_later_is_told_before(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
     table = {"teams": TEAMS, "pairings": [{"left": "Red", "right": "Blue"}], **changes}
     with pytest.raises(UsageError) as caught:
-        plan_from(table, where="plan", base=tmp_path)
+        schedule_from(table, where="schedule", base=tmp_path)
     assert words in str(caught.value)
 
 
@@ -221,24 +221,26 @@ def test_switches_may_be_words_and_shell_variables_are_no_placeholders(tmp_path:
         "pairings": [{"left": "Red", "right": "Blue"}],
         "server": {"options": {"synch_mode": "Off"}},
     }
-    [fixture] = plan_from(table, where="plan", base=tmp_path).fixtures
+    [fixture] = schedule_from(table, where="schedule", base=tmp_path).fixtures
     assert fixture.server.options["server::synch_mode"] is False
     assert filled_in(fixture.left.clients()[0][1], {"port": 7}) == ["sh", "-c", "r ${HOME} 7"]
 
 
-def test_the_same_plan_is_the_same_wherever_it_is_called_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("plans", "elsewhere"):
+def test_the_same_schedule_is_the_same_wherever_it_is_called_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("schedules", "elsewhere"):
         (tmp_path / name).mkdir()
-    (tmp_path / "plans" / "plan.toml").write_text(
+    (tmp_path / "schedules" / "schedule.toml").write_text(
         "[teams.Red]\ncommand = 'r'\n[teams.Blue]\ncommand = 'b'\n[[pairings]]\nleft = 'Red'\nright = 'Blue'\n"
     )
     found = []
-    for folder, path in (("plans", "plan.toml"), ("elsewhere", "../plans/plan.toml")):
+    for folder, path in (("schedules", "schedule.toml"), ("elsewhere", "../schedules/schedule.toml")):
         monkeypatch.chdir(tmp_path / folder)
-        found.append(load_plan(Path(path)).fixtures[0])
+        found.append(load_schedule(Path(path)).fixtures[0])
     assert found[0] == found[1]
 
 
 def test_a_folder_without_a_start_script_is_no_team(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="has no script called start"):
-        quick_plan("red", str(tmp_path), matches=1, server="srv", options={})
+        quick_schedule("red", str(tmp_path), matches=1, server="srv", options={})

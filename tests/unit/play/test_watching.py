@@ -1,4 +1,4 @@
-"""What is told of a match while it is played and afterwards: monitor packets, ports, holes, the record, output."""
+"""What is told of a match while it is played and afterwards: ports, holes, the record, output."""
 
 from __future__ import annotations
 
@@ -18,36 +18,9 @@ from teamclone.play.record import Fault, Record, Side, Trouble, load_record, sav
 from teamclone.play.schedule import Fixture, Limits, ServerSpec, TeamSpec
 from teamclone.play.server import find_server, gave_up, last_words, met_taken_port, programs_of, server_report
 from teamclone.play.verdict import verdict
-from teamclone.protocol.monitor import scene_of
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.rcss.state_bits import DISCARD
-
-PLAYER = b"((%s %d) 0 %s -50 0 0 0 0 0 (v h 120) (s 8000 1 1 130600) (c 0 0 0 0 1 0 0 0 0 0 0))"
-
-
-def packet(
-    *, states: dict[tuple[str, int], str], cycle: int = 7, pm: int = 3, left: str = "Red", right: str = "null"
-) -> bytes:
-    players = b" ".join(
-        PLAYER % (side.encode(), unum, states.get((side, unum), "0").encode()) for side in "lr" for unum in range(1, 12)
-    )
-    head = f"(show {cycle} (pm {pm}) (tm {left} {right} 1 2) ((b) 0 0 0 0) ".encode()
-    return head + players + b")\0"
-
-
-def test_a_packet_says_who_is_there() -> None:
-    scene = scene_of(packet(states={("l", 1): "0x9", ("l", 11): "0x1", ("r", 3): "0x100"}))
-    assert scene is not None
-    assert (scene.cycle, scene.playmode, scene.names, scene.scores) == (7, PlayMode.PLAY_ON, ("Red", None), (1, 2))
-    assert scene.present == ({1, 11}, {3})  # sent off is still there
-    assert scene.begun
-    assert not scene.over
-
-
-def test_other_packets_are_none_of_ours() -> None:
-    assert scene_of(b"(server_param (audio_cut_dist 50))") is None
-    assert scene_of(b"") is None
 
 
 def test_ports_that_are_in_use_are_passed_over() -> None:
@@ -121,7 +94,7 @@ def test_a_damaged_or_foreign_record_is_told_with_its_path(tmp_path: Path) -> No
     with pytest.raises(PlayError, match=r"match\.json: is damaged .* remove its folder"):
         load_record(tmp_path)
     (tmp_path / "match.json").write_text('{"format": 99}')
-    with pytest.raises(PlayError, match=r"match\.json: has format 99, expected 1"):
+    with pytest.raises(PlayError, match=r"match\.json: has format 99, expected 2"):
         load_record(tmp_path)
 
 

@@ -130,7 +130,7 @@ def test_rights(postgres: Server, url: str, match: Match) -> None:
     store.add(match)
     postgres.sql(f"create role {guest} login password '{PASSWORD}'")
     as_guest = postgres.url(user=guest, schema=name)
-    with pytest.raises(StoreError, match=f"permission denied for schema {name}.*docs/postgresql.md"):
+    with pytest.raises(StoreError, match=f"permission denied for schema {name}.*docs/howto/postgresql.md"):
         open_store(as_guest)
     with pytest.raises(StoreError, match=f"permission denied for database {DATABASE}"):
         create_store(postgres.url(user=guest, schema=f"{name}_new"))

@@ -1,0 +1,277 @@
+"""Write the generated parts of the documentation from the code.
+
+    python docs/generate.py
+
+Pages under `reference/` are made of prose and of blocks between `<!-- generated: NAME -->` and `<!-- end -->`.
+A block is written from the code, so it cannot age; `tests/docs/test_generated.py` compares the pages with it.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from typer.models import ArgumentInfo
+
+import teamclone
+from teamclone.cli.app import app
+from teamclone.store import schema
+from teamclone.training import config as training_config
+
+DOCS = Path(__file__).resolve().parent
+REFERENCE = DOCS / "reference"
+COMMANDS: dict[str, Callable[..., Any]] = {
+    one.name or one.callback.__name__: one.callback
+    for one in app.registered_commands
+    if one.callback is not None and not one.hidden
+}
+
+
+def pages() -> dict[Path, str]:
+    """Return every page that has a generated part, with the text it should have.
+
+    Raises:
+        FileNotFoundError: a command has no page under `docs/reference/commands/`.
+    """
+    made = {_command_page(name): _filled(_command_page(name), options=_options(name)) for name in COMMANDS}
+    made[REFERENCE / "settings.md"] = _filled(REFERENCE / "settings.md", settings=_settings())
+    made[REFERENCE / "api.md"] = _filled(REFERENCE / "api.md", api=_api())
+    made[REFERENCE / "data-model.md"] = schema.markdown()
+    return made
+
+
+def _command_page(name: str) -> Path:
+    return REFERENCE / "commands" / f"{name}.md"
+
+
+def _filled(page: Path, **blocks: str) -> str:
+    """The text of a page with its generated blocks replaced."""
+    text = page.read_text(encoding="utf-8")
+    for name, block in blocks.items():
+        pattern = re.compile(rf"(<!-- generated: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        if len(pattern.findall(text)) != 1:
+            raise ValueError(f"{page}: expected one block `<!-- generated: {name} -->` ... `<!-- end -->`")
+        text = pattern.sub(lambda found, block=block: f"{found[1]}\n{block}\n\n{found[2]}", text)
+    return text
+
+
+def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A Markdown table; a `|` inside a cell is escaped."""
+    lines = [list(heads)]
+    lines += [["---"] * len(lines[0]), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(cells)} |".replace("|  |", "| |").replace("|  |", "| |") for cells in lines)
+
+
+# Commands
+
+
+def _options(name: str) -> str:
+    """Usage and every argument and option of a command."""
+    signature = inspect.signature(COMMANDS[name])
+    hints = get_type_hints(COMMANDS[name], include_extras=True)
+    found = [(one, *get_args(hints[one.name])) for one in signature.parameters.values()]
+    arguments = [each for each in found if isinstance(each[2], ArgumentInfo)]
+    usage = " ".join(["teamclone", name, *(_argument(*each) for each in arguments), "[OPTIONS]"])
+    rows = [
+        (_names(*each), _type(each[1], each[2]), _default(each[0], each[1]), each[2].help or "")
+        for each in [*arguments, *(each for each in found if each not in arguments)]
+    ]
+    return f"```text\n{usage}\n```\n\n{_table(('argument or option', 'type', 'default', 'meaning'), rows)}"
+
+
+def _argument(parameter: inspect.Parameter, hint: Any, info: Any) -> str:
+    """An argument as in a usage line: `RUN`, `PATH...`, `[PLAN]`."""
+    name = info.metavar or parameter.name.upper()
+    shown = name + ("..." if _repeated(hint) and not name.endswith("...") else "")
+    return shown if _required(parameter) or name.startswith("[") else f"[{shown}]"
+
+
+def _names(parameter: inspect.Parameter, hint: Any, info: Any) -> str:
+    if isinstance(info, ArgumentInfo):
+        return f"`{_argument(parameter, hint, info)}`"
+    # Inside `Annotated`, Typer takes the first declared name for a default until it reads the signature.
+    names = [one for one in (info.default, *(info.param_decls or ())) if isinstance(one, str)]
+    if not names:
+        name = parameter.name.replace("_", "-")
+        names = [f"--{name}", f"--no-{name}"] if hint is bool else [f"--{name}"]
+    return ", ".join(f"`{name}`" for name in sorted(names, key=lambda name: not name.startswith("--")))
+
+
+def _type(hint: Any, info: Any) -> str:
+    """The type of a value in plain words, with its bounds."""
+    (inner, *_) = [one for one in get_args(hint) if one is not type(None)] or [hint]
+    if get_origin(inner) is list:
+        (inner,) = get_args(inner)
+    words = {int: "whole number", float: "number", bool: "switch", str: "text", Path: "path"}
+    kind = f"`{info.metavar}`" if info.metavar and not isinstance(info, ArgumentInfo) else words.get(inner, "")
+    if not kind:
+        kind = " or ".join(f"`{value}`" for value in (get_args(inner) or [one.value for one in inner]))
+    if info.min is not None and info.max is not None:
+        kind += f", {info.min} to {info.max}"
+    elif info.min is not None:
+        kind += f", at least {info.min}"
+    return f"{kind}, repeatable" if _repeated(hint) else kind
+
+
+def _repeated(hint: Any) -> bool:
+    return any(get_origin(one) is list for one in (hint, *get_args(hint)))
+
+
+def _required(parameter: inspect.Parameter) -> bool:
+    return parameter.default is inspect.Parameter.empty
+
+
+def _default(parameter: inspect.Parameter, hint: Any) -> str:
+    if _required(parameter):
+        return "required"
+    if hint is bool:
+        return "on" if parameter.default else "off"
+    return "" if parameter.default in (None, ()) else f"`{getattr(parameter.default, 'value', parameter.default)}`"
+
+
+# Settings
+
+
+def _settings() -> str:
+    """One table for each section of a run's settings."""
+    parts = []
+    for section, rows in _settings_rows().items():
+        parts.append(f"### {section}\n\n" + _table(("setting", "type", "default", "meaning"), rows))
+    return "\n\n".join(parts)
+
+
+def _settings_rows() -> dict[str, list[tuple[str, str, str, str]]]:
+    """Rows of each section: key, type, default and what it is, from the dataclasses and their docstrings."""
+    made: dict[str, list[tuple[str, str, str, str]]] = {}
+    for section, kind in get_type_hints(training_config.Config).items():
+        about = dict(_entries(_sections(inspect.getdoc(kind) or "").get("Attributes", "")))
+        table = training_config.to_table(training_config.Config())[section]
+        hints = get_type_hints(kind)
+        made[section] = [
+            (f"`{section}.{one.name}`", _hint(hints[one.name]), f"`{_toml(table[one.name])}`", about.get(one.name, ""))
+            for one in fields(kind)
+        ]
+    return made
+
+
+def _hint(hint: Any) -> str:
+    words = {int: "whole number", float: "number", bool: "switch", str: "word"}
+    return words[hint] if hint in words else f"list of {words[get_args(hint)[0]]}s"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+# Python API
+
+
+def _api() -> str:
+    """Signature, description and parameters of every public name, in the order of `teamclone.__all__`."""
+    names = [name for name in getattr(teamclone, "__all__", ()) if not name.startswith("__")]
+    return "\n\n".join(_described(f"teamclone.{name}", getattr(teamclone, name), level=3) for name in names)
+
+
+def _described(path: str, thing: Any, *, level: int) -> str:
+    """One public function, class or value."""
+    name = path.rpartition(".")[2]
+    parts = [f"{'#' * level} {name}"]
+    if inspect.isclass(thing) or callable(thing):
+        parts.append(f"```python\n{_signature(path, thing)}\n```")
+    parts += _prose(inspect.getdoc(thing) or "")
+    if inspect.isclass(thing) and not issubclass(thing, BaseException):
+        parts += [_described(f"{name}.{member}", found, level=level + 1) for member, found in _members(thing)]
+    return "\n\n".join(parts)
+
+
+def _members(kind: type) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Public methods that a class defines itself and describes."""
+    for name, found in vars(kind).items():
+        plain = found.__func__ if isinstance(found, classmethod | staticmethod) else found
+        if not name.startswith("_") and inspect.isfunction(plain) and plain.__doc__:
+            yield name, plain
+
+
+def _signature(path: str, thing: Any) -> str:
+    """A signature, one parameter a line where it is long."""
+    if inspect.isclass(thing) and (issubclass(thing, BaseException) or getattr(thing, "_is_protocol", False)):
+        return f"class {path}"
+    signature = inspect.signature(thing)
+    kept = [one.replace(annotation=_plain(one.annotation)) for one in signature.parameters.values()]
+    if not inspect.isclass(thing):
+        kept = [one for one in kept if one.name != "self"]
+    returned = inspect.Signature.empty if inspect.isclass(thing) else _plain(signature.return_annotation)
+    text = f"{path}{signature.replace(parameters=kept, return_annotation=returned)}"
+    if len(text) <= 100:
+        return text
+    head, _, tail = text.partition("(")
+    inner, _, result = tail.rpartition(")")
+    return f"{head}(\n    {_lines(inner)},\n){result}"
+
+
+class _Verbatim:
+    """An annotation that prints as it was written."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+def _plain(annotation: Any) -> Any:
+    if annotation is inspect.Signature.empty:
+        return annotation
+    return _Verbatim(annotation if isinstance(annotation, str) else inspect.formatannotation(annotation))
+
+
+def _lines(inner: str) -> str:
+    """Parameters one a line: split at commas outside brackets."""
+    depth, made = 0, ""
+    for sign in inner:
+        depth += (sign in "([{") - (sign in ")]}")
+        made += sign
+        if sign == "," and not depth:
+            made += "\n   "
+    return made
+
+
+def _prose(doc: str) -> list[str]:
+    """A docstring as Markdown: its paragraphs, then its sections as lists."""
+    made = []
+    for name, body in _sections(doc).items():
+        if not name:
+            made += [" ".join(part.split()) if "\n    " not in part else part for part in body.split("\n\n") if part]
+        elif entries := _entries(body):
+            made.append(f"**{name}**")
+            made.append("\n".join(f"- `{entry}`: {text}" for entry, text in entries))
+        elif body.strip():
+            made.append(f"**{name}**: {' '.join(body.split())}")
+    return made
+
+
+def _sections(doc: str) -> dict[str, str]:
+    """The parts of a docstring in Google's style by name; the description is under the empty name."""
+    parts = re.split(r"^(Args|Attributes|Returns|Yields|Raises):\n", doc, flags=re.MULTILINE)
+    return {"": parts[0].strip()} | dict(zip(parts[1::2], map(inspect.cleandoc, parts[2::2]), strict=True))
+
+
+def _entries(body: str) -> list[tuple[str, str]]:
+    """`name: text` entries of a section, with the lines that continue them."""
+    found = re.findall(r"^([\w*., ]+?)(?: \([^)]*\))?: (.*(?:\n[ \t]+.*)*)", body, flags=re.MULTILINE)
+    return [(name, " ".join(text.split())) for name, text in found]
+
+
+if __name__ == "__main__":
+    for path, text in pages().items():
+        if path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+            print(path.relative_to(DOCS.parent))

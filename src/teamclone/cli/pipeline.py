@@ -1,0 +1,78 @@
+"""`teamclone pipeline`."""
+
+from __future__ import annotations
+
+import sys
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def pipeline(
+    schedule: Annotated[Path, typer.Argument(help="Schedule (TOML): what to play, and what to make of it.")],
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for all that is made; one that was begun is gone on with.")
+    ],
+    jobs: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, help="Matches at once; one a processor unless given.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Play and clean on the Dask cluster of this scheduler: tcp://host:port.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what became of each stage and match as JSON.")] = False,
+) -> None:
+    """Play, store, make the dataset, train, evaluate and report. What is there already is kept."""
+    from teamclone.cli.common import print_json, print_table, progress
+    from teamclone.cli.play import line_of
+    from teamclone.cli.train import reporter
+    from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
+    from teamclone.system.cluster import executor_of
+
+    asked = load_pipeline(schedule)
+    with executor_of(scheduler, jobs=jobs) as executor, progress("pipeline") as bar:
+        task = bar.add_task("", total=len(asked.schedule.fixtures))
+
+        def show(stage: Stage, done: int, total: int) -> None:
+            bar.update(task, description=stage, completed=done, total=total)
+
+        report, stages = run_pipeline(
+            asked,
+            out,
+            executor=executor,
+            jobs=jobs,
+            watch=Watch(
+                on_progress=show,
+                on_training=reporter(bar, task),
+                on_record=lambda record: bar.console.print(
+                    line_of(record), markup=False, highlight=False, soft_wrap=True
+                ),
+            ),
+        )
+    if as_json:
+        rows = [
+            {"stage": result.stage, "done": result.done, "seconds": round(result.seconds, 2), "text": result.text}
+            for result in stages
+        ]
+        print_json({"stages": rows, **report.to_json()})
+    else:
+        print_table(
+            ("stage", "", "s", ""),
+            [
+                (result.stage, "done" if result.done else "kept", f"{result.seconds:.1f}", result.text)
+                for result in stages
+            ],
+            numeric=(2,),
+        )
+        for record in report.failed:
+            print(line_of(record))
+    if report.failed:
+        raise typer.Exit(1)
+
+
+@wraps(pipeline)
+def run(**options: Any) -> None:
+    """`pipeline` by the name that it had before."""
+    print("teamclone: run is now called pipeline; call teamclone pipeline instead", file=sys.stderr)
+    pipeline(**options)

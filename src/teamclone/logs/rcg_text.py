@@ -13,7 +13,8 @@ from teamclone.errors import LogError
 from teamclone.logs import scan
 from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
 from teamclone.logs.columns import COUNTERS, PLAYERS, counter_name
-from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity
+from teamclone.logs.match import Columns, GameLog, Problem, Severity
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import BY_NAME
 
 _PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')

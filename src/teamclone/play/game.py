@@ -17,9 +17,10 @@ import psutil
 from teamclone.play.ports import held_ports
 from teamclone.play.processes import MARK, end_all, start
 from teamclone.play.record import Fault
-from teamclone.play.schedule import N_UNUMS, Fixture, TeamSpec, filled_in
+from teamclone.play.schedule import Fixture, TeamSpec, filled_in
 from teamclone.play.server import last_words, met_taken_port, server_environment, server_words
 from teamclone.protocol.monitor import Monitor, Scene
+from teamclone.rcss.players import N_TEAM
 
 SIDES = ("left", "right")
 LEAST_ROOM = 32 << 20
@@ -228,7 +229,7 @@ class Game:
                 if waiting[side]:
                     self.wait_for_players(monitor, number, side=side, began=began[side])
         for side in range(2):
-            self.wait_for_players(monitor, N_UNUMS, side=side, began=began[side])
+            self.wait_for_players(monitor, N_TEAM, side=side, began=began[side])
 
     def wait_for_players(self, monitor: Monitor, number: int, *, side: int, began: float) -> None:
         while len(self.seen[side]) < number:
@@ -238,7 +239,7 @@ class Game:
             if time.monotonic() - began > self.fixture.limits.connect_s:
                 count = len(self.seen[side])
                 text = (
-                    f"{self.teams[side].name}: {count} of {N_UNUMS} players connected within "
+                    f"{self.teams[side].name}: {count} of {N_TEAM} players connected within "
                     f"{self.fixture.limits.connect_s:g} s{self.how_ended(side)}"
                 )
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)
@@ -297,7 +298,7 @@ class Game:
 def who(team: TeamSpec, unums: Iterable[int]) -> str:
     """Players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
     numbers = sorted(unums)
-    if len(numbers) == N_UNUMS:
+    if len(numbers) == N_TEAM:
         return f"{team.name}: the whole team is"
     names = ", ".join(map(str, numbers))
     return f"{team.name}: player{'s' if len(numbers) > 1 else ''} {names} {'are' if len(numbers) > 1 else 'is'}"

@@ -13,8 +13,9 @@ from teamclone.logs.match import Match, Severity
 from teamclone.play.game import FailedError, who
 from teamclone.play.holes import Holes, count_holes
 from teamclone.play.record import Fault
-from teamclone.play.schedule import N_UNUMS, Fixture
+from teamclone.play.schedule import Fixture
 from teamclone.rcss import state_bits
+from teamclone.rcss.players import TEAM_SLOTS
 from teamclone.rcss.playmodes import PlayMode
 
 
@@ -73,7 +74,7 @@ def _cycles(match: Match) -> int:
 def _blame(fixture: Fixture, flags: NDArray[np.bool_], fault: Fault, text: str) -> FailedError | None:
     """The first team with such players."""
     for side, team in enumerate((fixture.left, fixture.right)):
-        unums = [1 + int(index) for index in np.flatnonzero(flags[side * N_UNUMS : (side + 1) * N_UNUMS])]
+        unums = [1 + int(index) for index in np.flatnonzero(flags[TEAM_SLOTS[side]])]
         if unums:
             return FailedError(fault, f"{who(team, unums)} {text}", side=side, unums=unums)
     return None

@@ -17,6 +17,7 @@ from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
 from teamclone.evaluation.evaluate import read_document
 from teamclone.models.clone import model_id
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.system.machine import processor
 from teamclone.world.state import State
 
@@ -27,8 +28,6 @@ FORMAT = 1
 """Of bench.json."""
 N_PREDICTIONS = 20_000
 WARM_UP = 200
-TEAM = 22
-"""States of a batch: every player of a cycle, modelled as one team or as two."""
 N_STATES = 512
 """Different situations that the predictions take in turn."""
 
@@ -51,11 +50,11 @@ def measure_latency(
     """
     if not len(dataset):
         raise DatasetError(f"{dataset.path}: no samples to predict; build the dataset from more matches")
-    rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + TEAM)
+    rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + N_PLAYERS)
     dataset.need(model.inputs.channels, rows)
     states = dataset.state(rows, history=model.inputs.history)
     singles = [_slice(states, start, 1) for start in range(N_STATES)]
-    teams = [_slice(states, start, TEAM) for start in range(N_STATES)]
+    teams = [_slice(states, start, N_PLAYERS) for start in range(N_STATES)]
     model = model.cpu().eval()
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -73,7 +72,7 @@ def measure_latency(
         "versions": {"teamclone": teamclone.__version__, "torch": torch.__version__, "numpy": np.__version__},
         "machine": {"processor": processor(), "system": platform.platform(terse=True), "threads": 1},
         "single": _summary(single),
-        "team": {"states": TEAM, **_summary(team), "states_per_second": float(TEAM / np.mean(team) * 1e6)},
+        "team": {"states": N_PLAYERS, **_summary(team), "states_per_second": float(N_PLAYERS / np.mean(team) * 1e6)},
         "histogram": {
             "edges_us": np.round(edges, 3).tolist(),
             "counts": counts.tolist(),

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.logs.columns import counter_name
-from teamclone.logs.match import N_PLAYERS, Columns
+from teamclone.logs.match import Columns
 from teamclone.rcss.commands import BODY_KINDS, CommandKind
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.playmodes import MOVE_MODES
 
 _STOPPAGES = 1 << 20
@@ -49,7 +50,7 @@ def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, ha
 
 def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
     """Place on the player axis: 0..10 the left team's numbers 1..11, 11..21 the right team's; -1 for a coach."""
-    slot: NDArray[np.int64] = unum.astype(np.int64) - 1 + np.where(side < 0, 11, 0)
+    slot: NDArray[np.int64] = unum.astype(np.int64) - 1 + np.where(side < 0, N_TEAM, 0)
     slot[(unum == 0) | (side == 0)] = -1
     return slot
 

@@ -17,8 +17,6 @@ from teamclone.rcss import player_types as types_of
 Columns = dict[str, NDArray[Any]]
 """Arrays by column name, all of one length."""
 
-N_PLAYERS = 22
-
 
 class Severity(StrEnum):
     """How much a problem costs: ``note`` nothing, ``warning`` some records, ``error`` the rest of a file."""

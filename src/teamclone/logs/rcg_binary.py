@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from teamclone.errors import LogError
 from teamclone.logs import columns
 from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
-from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
+from teamclone.logs.match import Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
 
 COARSE = 16.0

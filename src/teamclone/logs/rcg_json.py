@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from teamclone.errors import LogError
 from teamclone.logs import columns
 from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
-from teamclone.logs.match import N_PLAYERS, Columns, GameLog, Problem, Severity, empty_columns
+from teamclone.logs.match import Columns, GameLog, Problem, Severity, empty_columns
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.playmodes import BY_NAME, PlayMode
 
 Record = dict[str, Any]
@@ -62,7 +63,7 @@ _LOWEST, _HIGHEST = np.array(
 """What the columns hold, shapes (n_columns,). Nothing that a server writes comes near."""
 _QUALITY = {"l": 0, "h": 1}
 _SIDE = {"l": 1, "r": -1}
-_SLOT = {"l": -1, "r": 10}
+_SLOT = {"l": -1, "r": N_TEAM - 1}
 """Add the number for the row of a player."""
 
 
@@ -267,8 +268,8 @@ def _open(record: Record) -> tuple[str, Any]:
 
 
 def _unum(value: Any) -> int:
-    if value not in range(1, N_PLAYERS // 2 + 1):
-        raise ValueError(f"player number {value}, expected 1 to 11")
+    if value not in range(1, N_TEAM + 1):
+        raise ValueError(f"player number {value}, expected 1 to {N_TEAM}")
     return int(value)
 
 

@@ -14,11 +14,12 @@ from teamclone.logs.assemble import SCORES
 from teamclone.logs.match import Columns, GameLog, Match
 from teamclone.rcss import player_types
 from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.playmodes import PlayMode
 
 TextVersion = Literal[4, 5, 6]
 
-_UNUMS = tuple((side, unum) for side in "lr" for unum in range(1, 12))
+_UNUMS = tuple((side, unum) for side in "lr" for unum in range(1, N_TEAM + 1))
 _MOTION = ("x", "y", "vx", "vy", "body", "neck")
 _POINTTO = ("pointto_x", "pointto_y")
 _FOCUS = ("focus_distance", "focus_direction")

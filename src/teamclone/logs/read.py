@@ -16,7 +16,6 @@ from teamclone.logs.align import executed_kind, first_body_commands, follows, fr
 from teamclone.logs.columns import FRAMES, PLAYERS
 from teamclone.logs.inflate import read_bytes
 from teamclone.logs.match import (
-    N_PLAYERS,
     CommandLog,
     GameLog,
     Match,
@@ -31,6 +30,7 @@ from teamclone.logs.rcg_json import read_json
 from teamclone.logs.rcg_text import read_text
 from teamclone.logs.rcl import FIRST_LINE, read_commands, sender_names
 from teamclone.rcss import state_bits
+from teamclone.rcss.players import N_PLAYERS, TEAM_SLOTS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.system.files import digest
 
@@ -335,7 +335,7 @@ def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:
         )
     state = game.players["state"]
     on_field = (state & state_bits.STAND) != 0
-    for side, team, slots in (("left", game.left, slice(0, 11)), ("right", game.right, slice(11, 22))):
+    for side, team, slots in zip(("left", "right"), (game.left, game.right), TEAM_SLOTS, strict=True):
         if team.name is None or not on_field[:, slots].any():
             problems.append(
                 Problem(code="no-team", severity=Severity.NOTE, text=f"no {side} team connected", path=path)

@@ -18,6 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.system.compiling import tell_when_compiled
 
 Bytes = NDArray[np.uint8]
@@ -346,9 +347,9 @@ def _scan_player(
     if side != 108 and side != 114:
         return begin, -BAD_STRUCTURE
     number, position = _number(buffer, _blank(buffer, position + 1, stop), stop)
-    if position < 0 or not 1 <= number <= 11:
+    if position < 0 or not 1 <= number <= N_TEAM:
         return begin, -BAD_STRUCTURE
-    slot = int(number) - 1 + (11 if side == 114 else 0)
+    slot = int(number) - 1 + (N_TEAM if side == 114 else 0)
     position = _expect(buffer, position, stop, 41)
     if position < 0:
         return begin, -BAD_STRUCTURE
@@ -559,7 +560,7 @@ def scan_shows(
                 outcome = -slot
                 break
             seen |= 1 << slot
-        if outcome == OK and seen != (1 << 22) - 1:
+        if outcome == OK and seen != (1 << N_PLAYERS) - 1:
             outcome = WRONG_PLAYERS
         if outcome == OK and _blank(buffer, position, stop) != stop:
             outcome = BAD_STRUCTURE
@@ -958,7 +959,7 @@ def scan_commands(
                     numeric = False
                     break
                 number = number * 10 + (_byte(buffer, at) - 48)
-            if numeric and (colon == underscore + 1 or not 1 <= number <= 11):
+            if numeric and (colon == underscore + 1 or not 1 <= number <= N_TEAM):
                 line_classes[line] = _LINE_ODD
                 continue
             unum = number if numeric else 0

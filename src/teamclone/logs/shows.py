@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from teamclone.logs import scan
 from teamclone.logs.columns import COUNTERS, PLAYERS, counter_name
-from teamclone.logs.match import N_PLAYERS, Columns
+from teamclone.logs.match import Columns
+from teamclone.rcss.players import N_PLAYERS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

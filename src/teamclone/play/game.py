@@ -16,10 +16,11 @@ import psutil
 from teamclone.play.ports import held_ports
 from teamclone.play.processes import MARK, end_all, start
 from teamclone.play.record import FailedError, Fault, who
-from teamclone.play.schedule import N_UNUMS, Fixture, TeamSpec, filled_in
+from teamclone.play.schedule import Fixture, TeamSpec, filled_in
 from teamclone.play.server import last_words, met_taken_port, server_environment, server_words
 from teamclone.protocol.client import LOOPBACK, MonitorClient
 from teamclone.protocol.monitor import Show, load_reader
+from teamclone.rcss.players import N_TEAM
 
 SIDES = ("left", "right")
 LEAST_ROOM = 32 << 20
@@ -232,7 +233,7 @@ class Game:
                 if waiting[side]:
                     self.wait_for_players(monitor, number, side=side, began=began[side])
         for side in range(2):
-            self.wait_for_players(monitor, N_UNUMS, side=side, began=began[side])
+            self.wait_for_players(monitor, N_TEAM, side=side, began=began[side])
 
     def wait_for_players(self, monitor: MonitorClient, number: int, *, side: int, began: float) -> None:
         """Wait until so many players of a side have connected."""
@@ -243,7 +244,7 @@ class Game:
             if time.monotonic() - began > self.fixture.limits.connect_s:
                 count = len(self.seen[side])
                 text = (
-                    f"{self.teams[side].name}: {count} of {N_UNUMS} players connected within "
+                    f"{self.teams[side].name}: {count} of {N_TEAM} players connected within "
                     f"{self.fixture.limits.connect_s:g} s{self.how_ended(side)}"
                 )
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)

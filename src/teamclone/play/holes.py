@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.logs.align import body_commands, slot_of
-from teamclone.logs.match import N_PLAYERS, Match
+from teamclone.logs.match import Match
 from teamclone.rcss import state_bits
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
 
 _FROZEN = state_bits.TACKLE | state_bits.FOUL_CHARGED

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from teamclone.errors import PlayError
-from teamclone.play.schedule import N_UNUMS, TeamSpec
+from teamclone.play.schedule import TeamSpec
+from teamclone.rcss.players import N_TEAM
 from teamclone.system.files import write_json
 
 FORMAT = 2
@@ -54,7 +55,7 @@ class FailedError(Exception):
 def who(team: TeamSpec, unums: Iterable[int]) -> str:
     """Name players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
     numbers = sorted(unums)
-    if len(numbers) == N_UNUMS:
+    if len(numbers) == N_TEAM:
         return f"{team.name}: the whole team is"
     names = ", ".join(map(str, numbers))
     return f"{team.name}: player{'s' if len(numbers) > 1 else ''} {names} {'are' if len(numbers) > 1 else 'is'}"

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from teamclone.errors import UsageError, choose
+from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.server_params import number
 from teamclone.system.files import digest
 from teamclone.system.settings import entries, fill
 
-N_UNUMS = 11
 COACH = 12
 """The number by which the league's ``start`` scripts know the coach."""
 
@@ -87,7 +87,7 @@ class TeamSpec:
         """Return label and words of each process to start: goalkeeper, players, coach; or the one for all."""
         if self.command:
             return [("team", shlex.split(self.command))]
-        numbers = [("goalie", 1), *((f"player-{unum}", unum) for unum in range(2, N_UNUMS + 1)), ("coach", COACH)]
+        numbers = [("goalie", 1), *((f"player-{unum}", unum) for unum in range(2, N_TEAM + 1)), ("coach", COACH)]
         if self.start:
             words = [*shlex.split(self.start), "{host}", "{folder}", "{unum}"]
             return [(label, [word.replace("{unum}", str(unum)) for word in words]) for label, unum in numbers]

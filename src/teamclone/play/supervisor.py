@@ -25,9 +25,10 @@ from teamclone.play.game import SIDES, Game, StoppedError
 from teamclone.play.holes import Holes
 from teamclone.play.processes import adopt_orphans
 from teamclone.play.record import FailedError, Fault, Record, Side, Trouble, bury_logs, save_record
-from teamclone.play.schedule import N_UNUMS, Fixture
+from teamclone.play.schedule import Fixture
 from teamclone.play.server import gave_up, hashes, programs_of, server_report
 from teamclone.play.verdict import read_logs, verdict
+from teamclone.rcss.players import N_TEAM
 
 STOPPED = 3
 """Exit code of a supervisor that was asked to stop."""
@@ -113,7 +114,7 @@ def _record(
     sides = []
     for side, team in enumerate(game.teams):
         played = None if match is None else (match.left, match.right)[side]
-        mine = slice(side * N_UNUMS, (side + 1) * N_UNUMS)
+        mine = slice(side * N_TEAM, (side + 1) * N_TEAM)
         counts = {
             name: None if holes is None or failed else tuple(int(count) for count in getattr(holes, name)[mine])
             for name in ("holes", "clashes", "missed")

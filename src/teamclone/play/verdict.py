@@ -12,8 +12,9 @@ from teamclone.logs import find_matches, read_pair
 from teamclone.logs.match import Match, Severity
 from teamclone.play.holes import Holes, count_holes
 from teamclone.play.record import FailedError, Fault, who
-from teamclone.play.schedule import N_UNUMS, Fixture
+from teamclone.play.schedule import Fixture
 from teamclone.rcss import state_bits
+from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.rcss.server_params import number
 
@@ -69,7 +70,7 @@ def _cycles(match: Match) -> int:
 def _blame(fixture: Fixture, flags: NDArray[np.bool_], fault: Fault, text: str) -> FailedError | None:
     """Blame the first team that has such players."""
     for side, team in enumerate((fixture.left, fixture.right)):
-        unums = [1 + int(index) for index in np.flatnonzero(flags[side * N_UNUMS : (side + 1) * N_UNUMS])]
+        unums = [1 + int(index) for index in np.flatnonzero(flags[side * N_TEAM : (side + 1) * N_TEAM])]
         if unums:
             return FailedError(fault, f"{who(team, unums)} {text}", side=side, unums=unums)
     return None

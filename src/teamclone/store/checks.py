@@ -14,6 +14,7 @@ from teamclone.errors import TeamcloneError
 from teamclone.logs.columns import COUNTERS, counter_name
 from teamclone.rcss import pitch, state_bits
 from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.store import schema
 
 if TYPE_CHECKING:
@@ -126,10 +127,12 @@ CHECKS = (
     ),
     Check(
         name="players-per-frame",
-        about="every frame has players 1 to 11 of both sides",
+        about=f"every frame has players 1 to {N_TEAM} of both sides",
         sql="select f.cycle, concat(count(p.frame), ' players in frame ', f.frame) as what "
-        "from frames f left join player_states p on p.frame = f.frame and abs(p.side) = 1 and p.unum between 1 and 11 "
-        "group by f.frame, f.cycle having count(p.frame) <> 22 or count(distinct p.side * p.unum) <> 22 "
+        "from frames f left join player_states p on p.frame = f.frame and abs(p.side) = 1 "
+        f"and p.unum between 1 and {N_TEAM} "
+        "group by f.frame, f.cycle "
+        f"having count(p.frame) <> {N_PLAYERS} or count(distinct p.side * p.unum) <> {N_PLAYERS} "
         "order by f.frame",
     ),
     Check(
@@ -204,7 +207,7 @@ CHECKS = (
         name="command-sender",
         about="commands come from a side's players or coach, or from the trainer",
         sql=_commands(
-            "side not in (1, 0, -1) or unum not between 0 and 11 or (side = 0 and unum <> 0)", "'sent a command'"
+            f"side not in (1, 0, -1) or unum not between 0 and {N_TEAM} or (side = 0 and unum <> 0)", "'sent a command'"
         ),
     ),
     Check(

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from teamclone import __version__
 from teamclone.logs import Problem
-from teamclone.logs.match import N_PLAYERS, Columns, Match
+from teamclone.logs.match import Columns, Match
+from teamclone.rcss.players import N_PLAYERS, SLOT_SIDES, SLOT_UNUMS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.store import schema
 from teamclone.store.schema import Table
@@ -23,9 +24,6 @@ from teamclone.system.files import digest
 
 Tables = dict[str, pa.Table]
 """Arrow tables by the names of ``schema.MATCH_TABLES``."""
-
-SIDES = np.repeat(np.array([1, -1], np.int8), N_PLAYERS // 2)
-UNUMS = np.tile(np.arange(1, N_PLAYERS // 2 + 1, dtype=np.uint8), 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,8 +129,8 @@ def player_columns(match: Match) -> dict[str, Any]:
     n_frames = _n_frames(match)
     return {
         "frame": np.repeat(np.arange(n_frames, dtype=np.int32), N_PLAYERS),
-        "side": np.tile(SIDES, n_frames),
-        "unum": np.tile(UNUMS, n_frames),
+        "side": np.tile(SLOT_SIDES, n_frames),
+        "unum": np.tile(SLOT_UNUMS, n_frames),
         **{name: values.ravel() for name, values in match.players.items()},
     }
 

@@ -14,10 +14,11 @@ from teamclone.errors import UsageError
 from teamclone.logs import Match, Team
 from teamclone.logs.assemble import stoppage_of
 from teamclone.logs.columns import FRAMES, PLAYERS
-from teamclone.logs.match import N_PLAYERS, GameLog, default_player_types, empty_columns
+from teamclone.logs.match import GameLog, default_player_types, empty_columns
 from teamclone.logs.rcg_text import read_text
 from teamclone.logs.rcg_write import TextVersion, write_text
 from teamclone.rcss import player_types
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
 
 VERSIONS: tuple[TextVersion, ...] = (4, 5, 6)

@@ -29,7 +29,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "dynamics": ("rcss",),
     "logs": BASE,
     "protocol": (*BASE, "logs"),
-    "world": ("rcss", "dynamics", "logs.columns", "logs.match"),
+    "world": ("rcss", "dynamics", "logs.columns", "logs.match", "logs.align"),
     "store": (*BASE, "logs"),
     "dataset": (*READING, "dynamics"),
     "play": (*BASE, "logs", "protocol", "store"),
@@ -49,20 +49,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
 ARROWS_FOR_NOW = {
     "evaluation.evaluate -> teamclone",
     "evaluation.latency -> teamclone",
-    "planner.dribble -> models.inputs.paper",
-    "planner.dribble -> models.inputs.reach",
-    "planner.hold_ball -> models.inputs.paper",
-    "planner.hold_ball -> models.inputs.reach",
-    "planner.kick_table -> models.inputs.paper",
-    "planner.kick_table -> models.inputs.reach",
-    "planner.passes -> models.inputs.paper",
-    "planner.plan -> models.inputs.paper",
-    "planner.plan -> models.inputs.reach",
     "planner.plan -> world.state",
-    "planner.players -> models.inputs.paper",
-    "planner.players -> models.inputs.reach",
-    "planner.shoot -> models.inputs.paper",
-    "planner.tackle -> models.inputs.paper",
 }
 
 MAY_IMPORT_TORCH = ("world.state", "world.mirror", "dataset.reader", "models", "training", "search", "evaluation")
@@ -72,11 +59,8 @@ MOST_LINES = 80
 TOO_LONG_FOR_NOW = {
     "cli.evaluate.print_summary",
     "cli.search.search",
-    "dataset.build.build_dataset",
-    "dataset.clean.clean_match",
     "evaluation.evaluate.evaluate",
     "logs.rcg_text.read_text",
-    "models.inputs.egocentric._parts",
     "training.loop.train",
 }
 KERNEL = re.compile(r"_?(njit|kernel|helper)\b")
@@ -84,14 +68,7 @@ KERNEL = re.compile(r"_?(njit|kernel|helper)\b")
 
 TELLING_DEFAULTS = (0.94, 130600, 0.085)
 """Defaults of the server that are no other number of the game: ball_decay, stamina_capacity, ball_size."""
-DEFAULTS_FOR_NOW = {
-    "models.inputs.egocentric: 130600",
-    "models.inputs.paper: 0.94",
-    "models.inputs.paper: BALL_DECAY",
-    "models.inputs.paper: BALL_SPEED_MAX",
-    "models.inputs.reach: 0.085",
-    "models.inputs.reach: BALL_SIZE",
-}
+DEFAULTS_FOR_NOW: set[str] = set()
 
 
 @cache

@@ -35,6 +35,11 @@ def wrap(angle: Value) -> Value:
     return _of(angle).remainder(angle + math.pi, 2 * math.pi) - math.pi
 
 
+def off_angle(angle: Value) -> Value:
+    """How far an angle is off straight ahead, in [0, pi]; the same to the bit for its opposite."""
+    return abs(wrap(abs(angle)))
+
+
 def roll(cycles: Value, decay: Value) -> Value:
     """Metres that a body covers in so many cycles per metre per cycle of its first velocity, if nothing moves it.
 
@@ -83,7 +88,7 @@ def kick_rate(
         distance: between the centres of player and ball.
         off_body: angle between the body and the ball.
     """
-    off = abs(wrap(off_body)) / math.pi
+    off = off_angle(off_body) / math.pi
     gap = distance - player_size - ball_size
     return kick_power_rate * (1.0 - 0.25 * off - 0.25 * gap / kickable_margin)
 
@@ -176,7 +181,7 @@ def tackle_power(
         off_body: angle between the body and the ball.
     """
     power = max_back_tackle_power + (max_tackle_power - max_back_tackle_power) * (1.0 - abs(direction) / math.pi)
-    return power * tackle_power_rate * (1.0 - 0.5 * abs(wrap(off_body)) / math.pi)
+    return power * tackle_power_rate * (1.0 - 0.5 * off_angle(off_body) / math.pi)
 
 
 def rested(

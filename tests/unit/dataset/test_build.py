@@ -101,7 +101,7 @@ def test_the_same_bytes_wherever_matches_are_cleaned(
     with Backwards(MATCHES) as executor:
         reports.append(build_dataset(config, store=store, out=tmp_path / "any", executor=executor))
     one = content(tmp_path / "one")
-    assert len(one) == 17
+    assert len(one) == 19
     for name, report in zip(("two", "any"), reports[1:], strict=True):
         assert content(tmp_path / name) == one
         assert report == reports[0]
@@ -188,7 +188,7 @@ def test_goalkeepers_are_for_training_only(store: Store, config: DatasetConfig, 
         assert dataset.meta["options"]["train_goalkeepers"] is keepers
         splits, n = dataset.samples["split"].numpy(), np.arange(len(dataset))
         state = dataset.state(n)
-        flags = state.players[n, state.actor, CHANNEL["flags"]].numpy().astype(int)
+        flags = state.players[state.frame, state.actor, CHANNEL["flags"]].numpy().astype(int)
         keeper = (flags & FLAG_GOALIE) != 0
         assert keeper.any() == keepers
         assert set(splits[keeper].tolist()) <= {Split.TRAIN}
@@ -233,7 +233,7 @@ def test_beyond_play_on_is_written_only_where_it_is_asked_for(
         assert tuple(report["rows"][split]) == REPERTOIRE
         assert sum(report["rows"][split].values()) > sum(usual["rows"][split].values()) > 0
     state = dataset.state(np.arange(len(dataset)))
-    keeper = (state.players[torch.arange(len(dataset)), state.actor, CHANNEL["flags"]].long() & FLAG_GOALIE) != 0
+    keeper = (state.players[state.frame, state.actor, CHANNEL["flags"]].long() & FLAG_GOALIE) != 0
     assert set(dataset.samples["split"][keeper].tolist()) == {Split.TRAIN, Split.VALIDATION, Split.TEST}
     assert is_current(tmp_path / "usual", config, store)
     assert is_current(tmp_path / "whole", whole, store)

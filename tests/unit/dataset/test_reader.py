@@ -233,7 +233,7 @@ def test_missing_foreign_or_other_format(tmp_path: Path) -> None:
     document = tiny(tmp_path / "ds") / "dataset.json"
     meta = json.loads(document.read_text())
     document.write_text(json.dumps(meta | {"format": 99}))
-    with pytest.raises(DatasetError, match=r"dataset of format 99, this version reads 2; make it again"):
+    with pytest.raises(DatasetError, match=r"dataset of format 99, this version reads 3; make it again"):
         open_dataset(tmp_path / "ds")
     for text in ("{", "[]", "{}", "3"):
         document.write_text(text)
@@ -241,7 +241,7 @@ def test_missing_foreign_or_other_format(tmp_path: Path) -> None:
             open_dataset(tmp_path / "ds")
 
 
-@pytest.mark.parametrize("name", ["frames/detail", "samples/kind", "player_types"])
+@pytest.mark.parametrize("name", ["frames/measured", "samples/kind", "player_types"])
 def test_damaged_arrays(tmp_path: Path, name: str) -> None:
     path = tiny(tmp_path / "ds") / f"{name}.npy"
     whole = path.read_bytes()

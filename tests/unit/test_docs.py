@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import re
+import shlex
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ import pytest
 import typer.main
 
 from teamclone.cli.app import app
+from teamclone.training.config import Config, to_table
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -81,3 +85,44 @@ def test_the_commands_of_the_readme_are_those_of_the_demo() -> None:
     run = {f"teamclone {verb}" for verb in re.findall(r"/teamclone (\w+)", demo)}
     assert run <= typed
     assert {line.split()[1] for line in typed} <= set(COMMANDS)
+
+
+def typed() -> list[tuple[str, list[str]]]:
+    """Every `teamclone` command in a block of the README and the pages: the page, and its words."""
+    found = []
+    for page in (ROOT / "README.md", *DOCS.rglob("*.md")):
+        for block in re.findall(r"^```(?:sh|console|)\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE):
+            lines = re.sub(r"\\\n", " ", block)
+            # A quoted argument may go over several lines.
+            commands = re.findall(r"^(?:\$ )?teamclone ((?:[^\n\"']|\"[^\"]*\"|'[^']*')*)", lines, re.MULTILINE)
+            found += [(page.name, shlex.split(command, comments=True)) for command in commands]
+    return found
+
+
+def test_commands_in_the_pages_have_these_options() -> None:
+    assert len(typed()) > 50
+    for page, (name, *words) in typed():
+        assert name in COMMANDS, f"{page}: teamclone {name}"
+        known = {option for parameter in COMMANDS[name].params for option in parameter.opts} | {"--help"}
+        options = [word for word in words if re.fullmatch(r"--?[a-z][a-z-]*", word)]
+        assert [option for option in options if option not in known] == [], f"{page}: teamclone {name}"
+
+
+def test_settings_in_the_pages_are_settings() -> None:
+    """Of `--set`, and wherever a page names one."""
+    known = {f"{section}.{key}" for section, values in to_table(Config()).items() for key in values}
+    for page, (name, *words) in typed():
+        if name in ("train", "adapt", "search"):
+            given = [after.partition("=")[0] for word, after in pairwise(words) if word == "--set"]
+            assert [key for key in given if key not in known] == [], f"{page}: teamclone {name}"
+    for path in DOCS.rglob("*.md"):
+        named = re.findall(r"`((?:model|data|train)\.[a-z_]+)(?: = [^`]*)?`", path.read_text())
+        assert [key for key in named if key not in known] == [], path.name
+
+
+def test_imports_in_the_pages_are_there() -> None:
+    for path in (ROOT / "README.md", *DOCS.rglob("*.md")):
+        for block in re.findall(r"```python\n(.*?)```", path.read_text(), re.DOTALL):
+            for module, names in re.findall(r"^from (teamclone[\w.]*) import (.*)$", block, re.MULTILINE):
+                found = importlib.import_module(module)
+                assert [name for name in names.split(", ") if not hasattr(found, name)] == [], f"{path.name}: {module}"

@@ -1,0 +1,31 @@
+"""The site builds without a warning, and a page of it loads nothing from another server."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.slow
+def test_the_site_builds_and_stands_alone(tmp_path: Path) -> None:
+    pytest.importorskip("material", reason="the site needs the extra docs")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path / "site"],
+        cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    pages = {page.relative_to(tmp_path / "site").with_suffix("") for page in (tmp_path / "site").rglob("*.html")}
+    assert {page.relative_to(ROOT / "docs").with_suffix("") for page in (ROOT / "docs").rglob("*.md")} <= pages
+    assert (tmp_path / "site" / "search" / "search_index.json").is_file()
+    for page in (tmp_path / "site").rglob("*.html"):
+        assert re.findall(r"<(?:script|img|iframe)[^>]* src=\"?https?:", page.read_text()) == []
+        assert (
+            re.findall(r"<link[^>]* rel=\"?(?:stylesheet|preconnect|icon)[^>]*href=\"?https?:", page.read_text()) == []
+        )

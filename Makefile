@@ -57,7 +57,7 @@ docs: install
 	$(BIN)/python docs/generate.py
 	$(BIN)/python docs/figures.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
-	@echo "Wrote site/index.html"
+	@echo "Wrote site/index.html; a browser searches only what comes from a server: $(BIN)/python -m http.server -d site"
 
 lint: install
 	$(BIN)/ruff check .

@@ -52,9 +52,9 @@ def measure_latency(
         raise DatasetError(f"{dataset.path}: no samples to predict; build the dataset from more matches")
     rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + N_PLAYERS)
     dataset.need(model.inputs.channels, rows)
-    states = dataset.state(rows, history=model.inputs.history)
-    singles = [_slice(states, start, 1) for start in range(N_STATES)]
-    teams = [_slice(states, start, N_PLAYERS) for start in range(N_STATES)]
+    starts, history = range(N_STATES), model.inputs.history
+    singles = [dataset.state(rows[start : start + 1], history=history) for start in starts]
+    teams = [dataset.state(rows[start : start + N_PLAYERS], history=history) for start in starts]
     model = model.cpu().eval()
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -79,10 +79,6 @@ def measure_latency(
             "slower": int((single > top).sum()),
         },
     }
-
-
-def _slice(states: State, start: int, length: int) -> State:
-    return State(*(tensor[start : start + length].contiguous() for tensor in states))
 
 
 def _times(

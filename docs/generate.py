@@ -140,27 +140,44 @@ def _settings() -> str:
     """One table for each section of a run's settings."""
     parts = []
     for section, rows in _settings_rows().items():
-        parts.append(f"### {section}\n\n" + _table(("setting", "type", "default", "meaning"), rows))
+        parts.append(f"### {section}\n\n" + _table(("setting", "values", "default", "meaning"), rows))
     return "\n\n".join(parts)
 
 
 def _settings_rows() -> dict[str, list[tuple[str, str, str, str]]]:
-    """Rows of each section: key, type, default and what it is, from the dataclasses and their docstrings."""
+    """Rows of each section: key, values, default and meaning, from the dataclasses and their docstrings."""
     made: dict[str, list[tuple[str, str, str, str]]] = {}
     for section, kind in get_type_hints(training_config.Config).items():
         about = dict(_entries(_sections(inspect.getdoc(kind) or "").get("Attributes", "")))
         table = training_config.to_table(training_config.Config())[section]
         hints = get_type_hints(kind)
         made[section] = [
-            (f"`{section}.{one.name}`", _hint(hints[one.name]), f"`{_toml(table[one.name])}`", about.get(one.name, ""))
+            (
+                f"`{section}.{one.name}`",
+                _values(f"{section}.{one.name}", hints[one.name]),
+                f"`{_toml(table[one.name])}`",
+                about.get(one.name, ""),
+            )
             for one in fields(kind)
         ]
     return made
 
 
-def _hint(hint: Any) -> str:
-    words = {int: "whole number", float: "number", bool: "switch", str: "word"}
-    return words[hint] if hint in words else f"list of {words[get_args(hint)[0]]}s"
+def _values(key: str, hint: Any) -> str:
+    """What a setting may be: its choices, or its type with bounds."""
+    scalar = hint if hint in (int, float, bool, str) else get_args(hint)[0]
+    if key in training_config._CHOICES:
+        text = ", ".join(f"`{choice}`" for choice in training_config._CHOICES[key])
+    else:
+        text = {int: "whole number", float: "number", bool: "switch", str: "word"}[scalar]
+        low, high = training_config._AT_LEAST.get(key), training_config._AT_MOST.get(key)
+        if key in training_config._ABOVE_ZERO:
+            text += ", above 0"
+        if low is not None:
+            text += f", at least {low}"
+        if high is not None:
+            text += f", at most {high}"
+    return text if scalar is hint else f"list: {text}"
 
 
 def _toml(value: Any) -> str:

@@ -68,3 +68,11 @@ def test_a_long_signature_has_a_line_for_each_parameter() -> None:
         "teamclone.sample(\n    a: dict[str, tuple[int, int]],\n    b: dict[str, tuple[int, int]],\n"
         "    c: dict[str, int],\n    d: int = 0,\n) -> None"
     )
+
+
+def test_settings_have_choices_bounds_and_defaults() -> None:
+    page = PAGES[generate.REFERENCE / "settings.md"]
+    assert '| `train.optimiser` | `adam`, `rmsprop`, `adagrad`, `muon` | `"adam"` |' in page
+    assert "| `model.dropout` | number, at least 0, at most 0.9 | `0.0` |" in page
+    assert "| `model.hidden` | list: whole number, at least 1 | `[512, 256, 128]` |" in page
+    assert "| `data.repeat` | switch | `false` |" in page

@@ -1,5 +1,92 @@
-"""teamclone learns how a RoboCup Soccer Simulation 2D team plays from the logs of its matches."""
+"""teamclone learns how a RoboCup Soccer Simulation 2D team plays from the logs of its matches.
 
+The public names load on first use, so that ``import teamclone`` is quick and needs none of the extras.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from teamclone.api import LoadedClone, load
+    from teamclone.dataset.build import DatasetConfig, build_dataset
+    from teamclone.dataset.reader import Dataset, open_dataset
+    from teamclone.errors import TeamcloneError
+    from teamclone.evaluation.evaluate import evaluate
+    from teamclone.evaluation.prediction import PredictionTable
+    from teamclone.evaluation.report import make_report
+    from teamclone.logs import Match, find_matches, read_match
+    from teamclone.store.ingest import ingest
+    from teamclone.store.opening import create_store, open_store
+    from teamclone.training.config import load_config
+    from teamclone.training.loop import train
+    from teamclone.training.run import Run, open_run
+    from teamclone.world.view import view
+    from teamclone.world.world import World
 
 __version__ = version("teamclone")
+
+_HOME = {
+    "read_match": "logs",
+    "find_matches": "logs",
+    "Match": "logs",
+    "create_store": "store.opening",
+    "open_store": "store.opening",
+    "ingest": "store.ingest",
+    "view": "world.view",
+    "World": "world.world",
+    "DatasetConfig": "dataset.build",
+    "build_dataset": "dataset.build",
+    "open_dataset": "dataset.reader",
+    "Dataset": "dataset.reader",
+    "load_config": "training.config",
+    "train": "training.loop",
+    "open_run": "training.run",
+    "Run": "training.run",
+    "load": "api",
+    "LoadedClone": "api",
+    "PredictionTable": "evaluation.prediction",
+    "evaluate": "evaluation.evaluate",
+    "make_report": "evaluation.report",
+    "TeamcloneError": "errors",
+}
+"""The module of each public name, in the order of the pipeline."""
+
+__all__ = [
+    "Dataset",
+    "DatasetConfig",
+    "LoadedClone",
+    "Match",
+    "PredictionTable",
+    "Run",
+    "TeamcloneError",
+    "World",
+    "build_dataset",
+    "create_store",
+    "evaluate",
+    "find_matches",
+    "ingest",
+    "load",
+    "load_config",
+    "make_report",
+    "open_dataset",
+    "open_run",
+    "open_store",
+    "read_match",
+    "train",
+    "view",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -62,6 +62,7 @@ class MatchSamples:
 
     Attributes:
         frames: layout.FRAME_ARRAYS without ``match``, only frames that have a sample.
+        kept: (n,) which frames of the match these are.
         samples: layout.SAMPLE_ARRAYS without ``split``; ``frame`` counts from this match's first kept frame.
         rules: every cleaning step in order.
         player_cycles: cycles x players of the team on the field, of those players and in those play modes that the
@@ -70,6 +71,7 @@ class MatchSamples:
     """
 
     frames: Columns
+    kept: NDArray[np.int64]
     samples: Columns
     rules: tuple[Rule, ...]
     player_cycles: int
@@ -102,10 +104,8 @@ def clean_match(
             command is a sample.
     """
     everybody = "catch" in repertoire
-    if "move" in repertoire:
-        in_play, where = SITUATION[frames["playmode"]] != Situation.OTHER, "in play_on or around a set play"
-    else:
-        in_play, where = frames["playmode"] == PlayMode.PLAY_ON, "in play_on"
+    in_play = frames_in_play(frames, repertoire)
+    where = "in play_on or around a set play" if "move" in repertoire else "in play_on"
     goalie = (players["state"] & state_bits.GOALIE) != 0
     slots = slot_of(commands["side"], commands["unum"])
     of_field = None if everybody or goalkeepers else ~goalie
@@ -121,14 +121,12 @@ def clean_match(
         executed = executed[chain.keep(executed, "executed by the server")]
     is_turn_zero = (chain.column("kind") == CommandKind.TURN) & (chain.column("arg0") == 0)
     if turn_zero is TurnZero.DROP:
-        kept = chain.keep(~is_turn_zero, "not (turn 0)")
-        executed, is_turn_zero = executed[kept], is_turn_zero[kept]
+        others = chain.keep(~is_turn_zero, "not (turn 0)")
+        executed, is_turn_zero = executed[others], is_turn_zero[others]
 
     own = slice(0, N_TEAM) if side > 0 else slice(N_TEAM, N_PLAYERS)
     state = players["state"][:-1, own]
-    due = in_play[:-1, None] & ((state & state_bits.STAND) != 0)
-    if not everybody:
-        due &= ~goalie[:-1, own]
+    due = players_to_model(frames, players, side=side, repertoire=repertoire)[:-1]
     idle = due & ~has_command[:-1, own]
     frozen = idle & ((state & (state_bits.TACKLE | state_bits.TACKLE_FAULT | state_bits.FOUL_CHARGED)) != 0)
 
@@ -151,12 +149,36 @@ def clean_match(
     world = view_columns(frames, players, params=server_params, side=side).select(kept)
     return MatchSamples(
         frames=_frames(world, frames["playmode"][kept]),
+        kept=kept,
         samples={**samples, "frame": local.astype(np.int32)},
         rules=tuple(chain.rules),
         player_cycles=int(due.sum()),
         idle=int(idle.sum()),
         frozen=int(frozen.sum()),
     )
+
+
+def frames_in_play(frames: Columns, repertoire: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Return (n_frames,) where a model of these commands applies: in play_on; with move in every Situation."""
+    if "move" in repertoire:
+        in_play: NDArray[np.bool_] = SITUATION[frames["playmode"]] != Situation.OTHER
+        return in_play
+    return np.asarray(frames["playmode"] == PlayMode.PLAY_ON)
+
+
+def players_to_model(
+    frames: Columns, players: Columns, *, side: int, repertoire: tuple[str, ...], goalkeepers: bool = False
+) -> NDArray[np.bool_]:
+    """Return (n_frames, 11) which players of a team a model of these commands applies to, and when.
+
+    Players on the field in `frames_in_play`; goalkeepers among them with catch, or where ``goalkeepers`` asks for them.
+    """
+    own = slice(0, N_TEAM) if side > 0 else slice(N_TEAM, N_PLAYERS)
+    state = players["state"][:, own]
+    due: NDArray[np.bool_] = frames_in_play(frames, repertoire)[:, None] & ((state & state_bits.STAND) != 0)
+    if "catch" not in repertoire and not goalkeepers:
+        due &= (state & state_bits.GOALIE) == 0
+    return due
 
 
 class _Chain:

@@ -14,20 +14,20 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-import teamclone
+from teamclone import __version__
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, RunError
 from teamclone.evaluation import baselines as rules
 from teamclone.evaluation import bootstrap, metrics
+from teamclone.evaluation.answers import BATCH, answers
 from teamclone.evaluation.metrics import Scores, Sums
 from teamclone.evaluation.outcome import Outcome
 from teamclone.models.clone import model_id, parameter_count
-from teamclone.models.heads.mixture import PointHead, with_ball
 from teamclone.rcss.commands import CLONED, parameters_of
 from teamclone.rcss.playmodes import RESTARTS, PlayMode
 from teamclone.system.files import write_json
-from teamclone.world.state import Target
+from teamclone.world.state import State
 
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 FORMAT = 2
 """Of evaluation.json; raised whenever a reader of the old one would misread the new one."""
 
-BATCH = 8192
 POSITIONS_PER_KIND = 2500
 """Points of Fig. 4: enough for a picture, few enough for a file."""
 TURN_EDGES = np.arange(-181.5, 182.0, 3.0)
@@ -76,36 +75,22 @@ def predict(
     """
     n = len(rows)
     dataset.need(model.inputs.channels, rows)
-    model.eval()
-    device = next(model.parameters()).device
     outcome, mode = _empty(n, dataset.commands), np.empty(n, np.int64)
-    with torch.inference_mode():
-        for start in range(0, n, batch):
-            part = rows[start : start + batch]
-            stop = start + len(part)
-            target = Target(*(tensor.to(device) for tensor in dataset.target(part)))
-            kicks = with_ball(target)
-            if inputs is None:
-                output = model.output(dataset.state(part, history=model.inputs.history).to(device), kicks=kicks)
-            else:
-                output = model.answer(model.inputs.normalise(inputs[start:stop].to(device)), kicks=kicks)
-            answer = model.head.point(output)
-            if model.config.head == "mixture" and not isinstance(model.head, PointHead):
-                likelihood = model.head.log_likelihood(output, target)
-                outcome.parameter_log_loss[start:stop] = -likelihood.float().cpu().numpy()
-            kind, issued, last = truth(dataset, part)
-            outcome.parameter_log_loss[start:stop][np.isnan(issued).all(1)] = np.nan
-            outcome.probabilities[start:stop] = answer.logits.float().softmax(1).cpu().numpy()
-            outcome.parameters[start:stop] = answer.parameters.float().cpu().numpy()
-            outcome.kind[start:stop] = kind
-            outcome.issued[start:stop] = issued
-            outcome.last[start:stop] = last
-            outcome.match[start:stop] = dataset.match(part).numpy()
-            mode[start:stop] = dataset.mode(part).numpy()
-            frame, actor = dataset.samples["frame"].numpy()[part], dataset.samples["player"].numpy()[part]
-            outcome.position[start:stop] = dataset.frames["position"].numpy()[frame, actor]
-            if on_batch is not None:
-                on_batch(len(part))
+
+    def inputs_of(part: slice) -> State | torch.Tensor:
+        return dataset.state(rows[part], history=model.inputs.history) if inputs is None else inputs[part]
+
+    for part, answer in answers(model, n, inputs_of, target_of=lambda part: dataset.target(rows[part]), batch=batch):
+        some = rows[part]
+        kind, issued, last = truth(dataset, some)
+        outcome.probabilities[part], outcome.parameters[part], outcome.parameter_log_loss[part] = answer
+        outcome.parameter_log_loss[part][np.isnan(issued).all(1)] = np.nan
+        outcome.kind[part], outcome.issued[part], outcome.last[part] = kind, issued, last
+        outcome.match[part], mode[part] = dataset.match(some).numpy(), dataset.mode(some).numpy()
+        frame, actor = dataset.samples["frame"].numpy()[some], dataset.samples["player"].numpy()[some]
+        outcome.position[part] = dataset.frames["position"].numpy()[frame, actor]
+        if on_batch is not None:
+            on_batch(len(some))
     return replace(outcome, mode=mode)
 
 
@@ -217,7 +202,7 @@ def evaluate(
     return {
         "format": FORMAT,
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "versions": {"teamclone": teamclone.__version__, "torch": torch.__version__, "numpy": np.__version__},
+        "versions": {"teamclone": __version__, "torch": torch.__version__, "numpy": np.__version__},
         "run": {
             "path": str(run.path),
             "checkpoint": checkpoint,

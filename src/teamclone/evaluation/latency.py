@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-import teamclone
+from teamclone import __version__
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError
 from teamclone.evaluation.evaluate import read_document
@@ -69,7 +69,7 @@ def measure_latency(
         "format": FORMAT,
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "model_id": model_id(model),
-        "versions": {"teamclone": teamclone.__version__, "torch": torch.__version__, "numpy": np.__version__},
+        "versions": {"teamclone": __version__, "torch": torch.__version__, "numpy": np.__version__},
         "machine": {"processor": processor(), "system": platform.platform(terse=True), "threads": 1},
         "single": _summary(single),
         "team": {"states": N_PLAYERS, **_summary(team), "states_per_second": float(N_PLAYERS / np.mean(team) * 1e6)},

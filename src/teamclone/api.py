@@ -1,0 +1,103 @@
+"""What ``import teamclone`` offers beside the functions of the rooms themselves: a clone that is ready to predict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from teamclone.errors import StoreError, UsageError
+from teamclone.evaluation.prediction import MatchColumns, PredictionTable, predict_match
+from teamclone.logs import Match, read_match
+from teamclone.rcss.player_types import FIELDS
+from teamclone.training.run import Run, open_run
+
+if TYPE_CHECKING:
+    from teamclone.models.clone import Clone
+    from teamclone.store import Store
+
+
+class LoadedClone:
+    """The clone of a run with weights of one of its checkpoints; `load` makes it.
+
+    Attributes:
+        run: the run it comes from. model: the PyTorch module.
+    """
+
+    def __init__(self, run: Run, model: Clone) -> None:
+        self.run, self.model = run, model
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """The commands that the clone predicts."""
+        return tuple(self.model.config.commands)
+
+    def predict(
+        self,
+        match: Match | Path | str,
+        *,
+        team: str | None = None,
+        side: str | None = None,
+        store: Store | None = None,
+        goalkeepers: bool = False,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> PredictionTable:
+        """Predict every command of a team in a match: a row for each of its players on the field and cycle in play.
+
+        Args:
+            match: a match; the path of its game log, beside which the command log is found; or, with ``store``, the id
+                of a match of it. Without a command log the columns of what was done are null.
+            team: name of the team, the modelled one or any other. side: "left" or "right", in its place.
+            store: where ``match`` is an id.
+            goalkeepers: predict goalkeepers even if the clone does not know catch.
+            on_progress: called with the rows done and their number.
+
+        Raises:
+            UsageError: the team does not play in the match, or neither a team nor a side is named.
+            LogError: the log cannot be read.
+            StoreError: the store has no such match.
+            DatasetError: the log lacks what the model needs.
+        """
+        columns = _columns(match, store)
+        return predict_match(
+            self.model,
+            columns,
+            side=columns.side_of(team, side),
+            goalkeepers=goalkeepers,
+            on_progress=on_progress,
+        )
+
+
+def load(run: Path | str, *, checkpoint: str = "best-loss") -> LoadedClone:
+    """Load the clone of a run folder.
+
+    Args:
+        run: folder made by ``train``.
+        checkpoint: which weights: best-loss, best-accuracy, last, ...
+
+    Raises:
+        RunError: there is no such run or checkpoint, or it is of another format.
+    """
+    opened = open_run(Path(run))
+    return LoadedClone(opened, opened.load_model(checkpoint).eval())
+
+
+def _columns(match: Match | Path | str, store: Store | None) -> MatchColumns:
+    if store is None:
+        return MatchColumns.of(match if isinstance(match, Match) else read_match(match))
+    if isinstance(match, Match):
+        raise UsageError("expected the id of a match of the store, got a match; leave out the store")
+    row = next((row for row in store.matches().to_pylist() if row["match_id"] == match), None)
+    if row is None:
+        raise StoreError(f"{store.location}: no match {match}; see `teamclone matches`")
+    tables = {name: store.read_match_columns(str(match), name) for name in ("frames", "player_states", "commands")}
+    return MatchColumns(
+        match_id=str(match),
+        left=row["left_name"],
+        right=row["right_name"],
+        frames=tables["frames"],
+        players=tables["player_states"],
+        commands=tables["commands"],
+        types=store.read_match_columns(str(match), "player_types", columns=FIELDS),
+        params=store.read_parameters(str(match))["server"],
+    )

@@ -210,7 +210,7 @@ class Dataset:
         return place[kind]
 
     def mode(self, rows: Rows) -> Tensor:
-        """(batch,) int64: the play mode of each sample as of `State`."""
+        """Return (batch,) int64 the play mode of each sample, as the modelled team sees it."""
         return self._mode(self.samples["frame"].index_select(0, torch.as_tensor(rows)).long())
 
     def match(self, rows: Rows) -> Tensor:

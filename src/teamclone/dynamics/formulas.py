@@ -115,7 +115,7 @@ def kicked(
     Args:
         velocity: of the ball before, as logged.
         power, direction: of the kick; the direction is that on the pitch: body plus argument.
-        rate: as of `kick_rate`.
+        rate: what `kick_rate` gives.
     """
     xp = _of(direction)
     x, y = limited(rate * power * xp.cos(direction), rate * power * xp.sin(direction), ball_accel_max)

@@ -58,8 +58,8 @@ def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
 def body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Indices of the players' commands that would take a body slot of their frame if it were free, in log order.
 
-    A ``move`` in a play mode that does not allow it leaves the slot free, an invalid command never takes it. Arguments
-    as of ``first_body_commands``.
+    A ``move`` in a play mode that does not allow it leaves the slot free, an invalid command never takes it. The
+    arguments are those of ``first_body_commands``.
     """
     body = _IS_BODY.take(commands["kind"])
     body &= commands["valid"]

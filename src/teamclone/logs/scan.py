@@ -408,7 +408,7 @@ def _scan_player(
                     return at, -BAD_NUMBER
                 floats[index, frame, slot] = value
                 position = after
-        elif tag == 102:  # f: whom he listens to
+        elif tag == 102:  # f: the player listened to
             at = _blank(buffer, position + 1, stop)
             if at < stop:
                 attention_sides[frame, slot] = 1 if _byte(buffer, at) == 108 else -1

@@ -1,7 +1,7 @@
 """The game reflected at the long axis: what is left becomes right, and players change places with their counterparts.
 
 The simulator does not know left from right, so the mirrored command is right in the mirrored situation, if the team
-plays the same on both sides. A player's role hangs on his number, hence the left back becomes the right back.
+plays the same on both sides. A player's role goes with the number, hence the left back becomes the right back.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from teamclone.rcss.commands import CLONED, parameters_of
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.world.channels import CHANNEL
 from teamclone.world.state import State, Target
 
-TEAM = 11
-"""Players of the modelled team, who come first."""
 _BALL = torch.tensor([1.0, -1.0, 1.0, -1.0])
 _CHANNELS = torch.ones(len(CHANNEL))
 _CHANNELS[[CHANNEL[name] for name in ("y", "vy", "body", "neck")]] = -1.0
@@ -57,22 +56,23 @@ def mirror_target(target: Target, commands: tuple[str, ...] = CLONED) -> Target:
 
 
 def mirror_places(mean: NDArray[np.floating]) -> Tensor:
-    """(22,) int64: each player's counterpart, and his counterpart's counterpart is himself.
+    """Return (22,) int64 each player's counterpart, whose counterpart is that player again.
 
-    Of the modelled team he is found by the least squared distance, summed over the team, between where each player
+    Counterparts in the modelled team have the least squared distance, summed over the team, between where each player
     stands on average and where each stands mirrored. Opponents keep their places: they are many teams, whose numbers
-    mean different roles, and no input but the paper's knows an opponent by his number.
+    mean different roles, and no input but the paper's knows an opponent by number.
 
     Args:
-        mean: (22, 2) metres, each player's mean position; not a number where he never played, who is his own.
+        mean: (22, 2) metres, each player's mean position; NaN for a player who never played, whose counterpart is
+            itself.
     """
     from scipy.optimize import linear_sum_assignment
 
-    # Far away, who never played costs nothing as his own counterpart and much as another's.
-    team = np.where(np.isfinite(mean[:TEAM]), mean[:TEAM], (1e4, 0.0))
+    # Far away, a player who never played costs nothing as its own counterpart and much as another's.
+    team = np.where(np.isfinite(mean[:N_TEAM]), mean[:N_TEAM], (1e4, 0.0))
     cost = np.square(team[:, None] - team[None] * (1.0, -1.0)).sum(-1)
     # The costs are symmetric, so that the best matching is its own inverse, unless several are equally good.
     found = linear_sum_assignment(cost)[1]
-    number = np.arange(TEAM)
+    number = np.arange(N_TEAM)
     pairs = np.where(found[found] == number, found, number)
-    return torch.from_numpy(np.concatenate([pairs, np.arange(TEAM, 2 * TEAM)]))
+    return torch.from_numpy(np.concatenate([pairs, np.arange(N_TEAM, N_PLAYERS)]))

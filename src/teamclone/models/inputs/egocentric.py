@@ -111,7 +111,7 @@ class EgocentricFeatures(nn.Module):
         return torch.where(turned, -1.0, 1.0)
 
     def counterparts(self, places: Tensor) -> Tensor:
-        """As of `PaperFeatures`: only the role knows a player by his number."""
+        """Return (len(names),) which column holds in the mirror what this one holds: only the role knows numbers."""
         order = list(range(len(self.names)))
         if "role" in self.blocks:
             first = self.names.index("role_0")

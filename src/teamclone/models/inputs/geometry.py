@@ -21,12 +21,12 @@ GEOMETRY = (
 )  # fmt: skip
 """What makes a command of a place on the pitch or of a wanted motion; metres, metres per cycle, radians:
 
-x, y: the actor. coast_x, coast_y: where he comes to rest without a dash. cos, sin: of his body direction.
-forward, aside: his velocity along and across the body. turn_factor: turn moment for one degree. decay: of his velocity.
+x, y: the actor. coast_x, coast_y: where it comes to rest without a dash. cos, sin: of its body direction.
+forward, aside: its velocity along and across the body. turn_factor: turn moment for one degree. decay: of its velocity.
 dash_gain: speed that one unit of dash power gives. income: stamina that one cycle gives back.
 line_x: the offside line, or where a team mate meets the ball if that is further. near_m: see NEAR_SHARE.
 ball_x, ball_y, ball_vx, ball_vy: the ball. kick_gain: speed that one unit of kick power gives it.
-turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from where he rolls out to where he meets it.
+turn_to_ball, turn_to_meet: angles to face the ball in the next cycle, and from the inertia point to where it is met.
 kick_area: see `kickable_area`; kick_margin: the part of it beyond the edges of player and ball.
 ball_decay, ball_speed_max: of the match's server.
 mate_0_x, ...: the team mates, the nearest first; where one is missing, the actor.
@@ -36,39 +36,39 @@ _PLACE = {name: index for index, name in enumerate(GEOMETRY)}
 OTHERS = MATES + N_TEAM
 """The other players: the team mates, then the opponents, of each side the nearest first."""
 OTHER = ("x", "y", "vx", "vy", "cos", "sin", "there", "keeper")
-"""What is said of each: where he is, metres, his velocity, metres per cycle, his body direction, whether he is there,
-whether he keeps the goal. All 0 where he is not.
+"""Columns of each: position, metres, velocity, metres per cycle, body direction, whether there is such a player,
+whether it is the goalkeeper. All 0 where there is none.
 """
 
 
 WAY = tuple(f"{name}_{what}" for name in WAYS for what in ("there", "vx", "vy"))
 """Of each way to kick that a plan knows: whether there is one, and the velocity of the ball, metres per cycle."""
 TACKLE = ("tackle_there", "tackle_degrees")
-"""Whether he may tackle the ball, and where to a plan says, degrees from his body."""
+"""Whether the actor can tackle the ball, and the planned direction, degrees from the body."""
 SIDED = frozenset((*(f"{name}_vy" for name in WAYS), "tackle_degrees"))
 
 
 def geometry_of(geometry: Tensor, *names: str) -> list[Tensor]:
-    """Columns of GEOMETRY, (batch, 1) each."""
+    """Return columns of GEOMETRY, (batch, 1) each."""
     return [geometry[:, _PLACE[name], None] for name in names]
 
 
 def mates_of(geometry: Tensor) -> Tensor:
-    """(batch, MATES, 2) where the team mates are."""
+    """Return (batch, MATES, 2) the positions of the team mates."""
     first = _PLACE["mate_0_x"]
     return geometry[:, first : first + 2 * MATES].reshape(-1, MATES, 2)
 
 
 def others_of(geometry: Tensor) -> Tensor:
-    """(batch, OTHERS, len(OTHER)) of features that have them."""
+    """Return (batch, OTHERS, len(OTHER)) of features that have them."""
     return geometry[:, len(GEOMETRY) : len(GEOMETRY) + OTHERS * len(OTHER)].reshape(-1, OTHERS, len(OTHER))
 
 
 def ways_of(geometry: Tensor) -> Tensor:
-    """(batch, len(WAYS), 3) of features with the block ``plan``: whether there is one, and the ball's velocity."""
+    """Return (batch, len(WAYS), 3) of features with the block ``plan``: is there one, and the ball's velocity."""
     return geometry[:, -len(WAY) :].reshape(-1, len(WAYS), 3)
 
 
 def tackle_of(geometry: Tensor) -> Tensor:
-    """(batch, 2) TACKLE of such features."""
+    """Return (batch, 2) TACKLE of features with the block ``plan``."""
     return geometry[:, -len(WAY) - len(TACKLE) : -len(WAY)]

@@ -222,7 +222,10 @@ def _signature(path: str, thing: Any) -> str:
     if inspect.isclass(thing) and (issubclass(thing, BaseException) or getattr(thing, "_is_protocol", False)):
         return f"class {path}"
     signature = inspect.signature(thing)
-    kept = [one.replace(annotation=_plain(one.annotation)) for one in signature.parameters.values()]
+    kept = [
+        one.replace(annotation=_plain(one.annotation), default=_shown(one.default))
+        for one in signature.parameters.values()
+    ]
     if not inspect.isclass(thing):
         kept = [one for one in kept if one.name != "self"]
     returned = inspect.Signature.empty if inspect.isclass(thing) else _plain(signature.return_annotation)
@@ -242,6 +245,13 @@ class _Verbatim:
 
     def __repr__(self) -> str:
         return self.text
+
+
+def _shown(default: Any) -> Any:
+    """A default that prints the same in every process: the value of an enum, `...` for a function."""
+    if default is inspect.Parameter.empty or inspect.isclass(default):
+        return default
+    return _Verbatim("...") if callable(default) else getattr(default, "value", default)
 
 
 def _plain(annotation: Any) -> Any:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -59,6 +62,12 @@ def test_every_command_prints_what_the_page_shows(tmp_path: Path) -> None:
         printed = teamclone(*shlex.split(command), cwd=tmp_path).stdout
         assert fits(shown, printed), f"teamclone {command}\n--- the page shows\n{shown}\n--- printed\n{printed}"
     assert (tmp_path / "run" / "report.html").is_file()
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows, columns = done.stdout.split(" ", 1)
+    assert int(rows) > 10_000
+    assert {"cycle", "unum", "p_dash"} <= set(ast.literal_eval(columns))
 
 
 def test_the_better_clone_is_that_of_the_demo() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import typer.main
 
+import teamclone
 from teamclone.cli.app import app
 from teamclone.training.config import Config, to_table
 
@@ -126,3 +127,9 @@ def test_imports_in_the_pages_are_there() -> None:
             for module, names in re.findall(r"^from (teamclone[\w.]*) import (.*)$", block, re.MULTILINE):
                 found = importlib.import_module(module)
                 assert [name for name in names.split(", ") if not hasattr(found, name)] == [], f"{path.name}: {module}"
+
+
+def test_public_names_in_the_pages_are_there() -> None:
+    for path in (ROOT / "README.md", *DOCS.rglob("*.md")):
+        for block in re.findall(r"```python\n(.*?)```", path.read_text(), re.DOTALL):
+            assert set(re.findall(r"\btc\.(\w+)", block)) <= set(teamclone.__all__), path.name

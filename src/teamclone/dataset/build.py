@@ -49,9 +49,9 @@ class DatasetConfig:
         unseen: opponents kept out of training, validation and test.
         split: see SplitBy.
         commands, turn_zero: see `clean`.
-        train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. Teams now and
-            then give the goalkeeper another number. The field player with the goalkeeper's usual number may play much
-            like it, and a network that knows players by number has otherwise never seen that number.
+        train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. A team may
+            give its goalkeeper another number than usual. A field player then wears the usual one, which a network
+            that knows players by their numbers has otherwise never seen.
         goalkeepers: model goalkeepers as everybody else, in every split, and ``catch`` as a command.
         set_plays: take the commands of all play modes that have a Situation, not only of play_on, and ``move`` as one.
         idle: take cycles without a body command as samples of ``none``.

@@ -16,7 +16,6 @@ from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mix
 from teamclone.models.heads.kick import (
     AHEAD_M,
     BALL_COMPONENTS,
-    BALL_SPEED_MAX,
     DRIBBLES,
     IMPOSSIBLE,
     LEAD_M,
@@ -42,7 +41,7 @@ OUTPUTS = ("share", "ahead", "aside", "speed", "power", "direction")
 def geometry(**values: float) -> torch.Tensor:
     """One situation: the player at (10, -5) faces +y; the ball lies at (10, -4), unmoving; mates are where he is."""
     usual = {"x": 10, "y": -5, "cos": 0, "sin": 1, "decay": 0.4, "dash_gain": 0.006, "ball_x": 10, "ball_y": -4}
-    usual |= {"kick_gain": 0.02}
+    usual |= {"kick_gain": 0.02, "ball_decay": 0.94, "ball_speed_max": 3.0}
     usual |= {f"mate_{mate}_{axis}": usual[axis] for mate in range(MATES) for axis in "xy"}
     return torch.tensor([[float((usual | values).get(name, 0.0)) for name in GEOMETRY]])
 
@@ -82,7 +81,6 @@ def test_a_pass_at_half_speed() -> None:
     """An output of 0 is half of the ball's greatest speed, straight to the team mate."""
     got = kick(component=2, mate_2_x=30.0, mate_2_y=-4.0)
     assert got == pytest.approx([1.5 / 0.02, -90.0], abs=1e-2)
-    assert BALL_SPEED_MAX == 3.0
 
 
 def test_a_pass_stops_what_the_ball_does() -> None:

@@ -210,7 +210,7 @@ class Exported(torch.nn.Module):
 def test_a_model_of_all_commands_can_be_exported() -> None:
     def inputs(n: int) -> tuple[Tensor, ...]:
         state = situations(n, seed=n)
-        return (*state[:4], state.mode, state.mode_cycles)
+        return (state.ball, state.players, state.types, state.actor, state.mode, state.mode_cycles)
 
     model = Exported(fitted(MIXTURE, situations(50)))
     batch = torch.export.Dim("batch", min=1)

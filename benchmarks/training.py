@@ -82,8 +82,8 @@ def bare_step(dataset: Dataset, rows: np.ndarray, *, bfloat: bool) -> Callable[[
 
     def step() -> None:
         with torch.autocast("cpu", torch.bfloat16, enabled=bfloat):
-            output = model.answer(inputs)
-        loss = model.head.loss(output, target)
+            output = model.answer_inputs(inputs)
+        loss = model.loss(output, target)
         optimiser.zero_grad(set_to_none=True)
         loss.total.backward()
         optimiser.step()

@@ -375,7 +375,7 @@ def test_distributions_are_judged_by_their_likelihood(tmp_path: Path) -> None:
     section = load_evaluation(run.path / "evaluation.json")["splits"]["test"]
     rows, model = data.split(Split.TEST), run.load_model()
     with torch.no_grad():
-        likelihood = model.head.log_likelihood(model.output(data.state(rows)), data.target(rows)).numpy()
+        likelihood = model.answer(data.state(rows)).log_likelihood(data.target(rows)).numpy()
     for kind, name in enumerate(kind.name.lower() for kind in CLONED_KINDS):
         loss = section["commands"][name]["parameter_log_loss"]["value"]
         assert loss == pytest.approx(-likelihood[data.target(rows).kind.numpy() == kind].mean(), rel=1e-4)

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from teamclone.models.heads.mixture import PointHead, with_ball
+from teamclone.models.heads.mixture import with_ball
 from teamclone.world.state import State, Target
 
 if TYPE_CHECKING:
@@ -66,13 +66,13 @@ def answers(
                 kicks = kicks_of(part).to(device)
             given = inputs_of(part).to(device)
             if isinstance(given, State):
-                output = model.output(given, kicks=kicks)
+                answer = model.answer(given, kicks=kicks)
             else:
-                output = model.answer(model.inputs.normalise(given), kicks=kicks)
-            point = model.head.point(output)
+                answer = model.answer_inputs(model.inputs.normalise(given), kicks=kicks)
+            point = answer.point()
             log_loss = np.full(part.stop - part.start, np.nan, np.float32)
-            if target is not None and not isinstance(model.head, PointHead) and model.config.head == "mixture":
-                log_loss[:] = -model.head.log_likelihood(output, target).float().cpu().numpy()
+            if target is not None and answer.has_density:
+                log_loss[:] = -answer.log_likelihood(target).float().cpu().numpy()
         yield (
             part,
             Answers(

@@ -9,18 +9,23 @@ from typing import Any, cast
 import torch
 from torch import Tensor, nn
 
+from teamclone.models.answer import Answer, Prediction
 from teamclone.models.config import ModelConfig
-from teamclone.models.heads.mixture import AtBall, EnsembleHead, MixtureHead, PointHead, Prediction, Situation
+from teamclone.models.heads.ensemble import EnsembleHead
+from teamclone.models.heads.mixture import MixtureHead
+from teamclone.models.heads.point import PointHead
+from teamclone.models.heads.trunk_output import KickFeatures, TrunkOutput
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.paper import Features, PaperFeatures
-from teamclone.models.layers.players import Crowd
-from teamclone.models.layers.targets import COLUMNS, Aims, layers
-from teamclone.world.state import State
+from teamclone.models.layers.players import PlayerEncoder
+from teamclone.models.layers.targets import TARGET_COLUMNS, TargetPoints, layers
+from teamclone.models.loss import Loss
+from teamclone.world.state import State, Target
 
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"relu": nn.ReLU, "gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
 
 
-class AimedTrunk(nn.Module):
+class EgocentricTrunk(nn.Module):
     """Hidden layers over relative inputs: where the player makes for, then what he does, how, and apart from it a kick.
 
     The layers of dashes and turns see what the command was decided on, but do not teach it, see `MixtureHead`.
@@ -42,8 +47,8 @@ class AimedTrunk(nn.Module):
         ):
             self.register_buffer(name, torch.tensor(features.columns(blocks)), persistent=False)
         self.register_buffer("signs", features.signs, persistent=False)
-        self.aims = Aims(len(self.aim_columns), config.aims, config.aim_hidden, activation)
-        seen = len(self.command_columns) + COLUMNS * config.aims
+        self.aims = TargetPoints(len(self.aim_columns), config.aims, config.aim_hidden, activation)
+        seen = len(self.command_columns) + TARGET_COLUMNS * config.aims
         self.command = layers((seen, *config.hidden), activation, config.dropout)
         self.answers = config.head == "mixture"
         if self.answers:
@@ -52,28 +57,28 @@ class AimedTrunk(nn.Module):
             )
             self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.kick_dropout)
             width = config.kick_attention
-            self.crowd = Crowd(width, config.kick_hidden[-1]) if width else None
+            self.crowd = PlayerEncoder(width, config.kick_hidden[-1]) if width else None
 
-    def forward(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Situation:
+    def forward(self, inputs: Tensor, *, kicks: Tensor | None = None) -> TrunkOutput:
         """``kicks``: which of the situations need the layers of a kick, (n,) places; None for all."""
         columns, geometry = inputs[:, : self.n_inputs], inputs[:, self.n_inputs :]
         aims, bearing, power = self.aims(columns.index_select(1, self.aim_columns), geometry)
         seen = torch.cat([columns.index_select(1, self.command_columns), aims], 1)
         hidden = self.command(seen)
-        parameters, at_ball = hidden[:0], AtBall(hidden[:0], geometry[:0], None)
+        parameters, at_ball = hidden[:0], KickFeatures(hidden[:0], geometry[:0], None)
         if self.answers:
             parameters = self.parameters_of(torch.cat([seen, hidden], 1).detach())
             at_ball = self.at_ball(inputs if kicks is None else inputs.index_select(0, kicks))
-        return Situation(hidden, parameters, at_ball, kicks, geometry, bearing, power)
+        return TrunkOutput(hidden, parameters, at_ball, kicks, geometry, bearing, power)
 
-    def at_ball(self, inputs: Tensor) -> AtBall:
+    def at_ball(self, inputs: Tensor) -> KickFeatures:
         """What kicks and tackles hang on, which is nothing that the other layers find."""
         both = torch.cat([inputs, inputs * self.signs])
         kick, geometry, targets = self.kick(both.index_select(1, self.kick_columns)), both[:, self.n_inputs :], None
         if self.crowd is not None:
             together, targets = self.crowd(kick, geometry)
             kick = torch.cat([kick, together], 1)
-        return AtBall(kick, geometry, targets)
+        return KickFeatures(kick, geometry, targets)
 
 
 class Trunks(nn.Module):
@@ -86,15 +91,15 @@ class Trunks(nn.Module):
     def forward(self, inputs: Tensor, **options: Any) -> list[Any]:
         return [member(inputs, **options) for member in self.members]
 
-    def at_ball(self, inputs: Tensor) -> list[AtBall]:
-        return [cast(AimedTrunk, member).at_ball(inputs) for member in self.members]
+    def at_ball(self, inputs: Tensor) -> list[KickFeatures]:
+        return [cast(EgocentricTrunk, member).at_ball(inputs) for member in self.members]
 
 
 class Clone(nn.Module):
     """A network that plays like a team: which command a player gives in a situation, and with which parameters."""
 
     features: PaperFeatures | EgocentricFeatures
-    trunk: nn.Sequential | AimedTrunk | Trunks
+    trunk: nn.Sequential | EgocentricTrunk | Trunks
     head: PointHead | MixtureHead | EnsembleHead
 
     def __init__(self, config: ModelConfig) -> None:
@@ -119,28 +124,39 @@ class Clone(nn.Module):
     def inputs(self) -> Features:
         return cast(Features, self.features)
 
-    def output(self, state: State, *, kicks: Tensor | None = None) -> Any:
-        """What the head answers, for ``head.loss`` and ``head.point``; ``kicks`` as of `answer`."""
-        return self.answer(self.features(state), kicks=kicks)
+    def answer(self, state: State, *, kicks: Tensor | None = None) -> Answer:
+        """Return the answer to a state; ``kicks`` as in `answer_inputs`."""
+        return self.answer_inputs(self.features(state), kicks=kicks)
 
-    def answer(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Any:
-        """The same from what the features make of a state, (batch, columns).
+    def answer_inputs(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Answer:
+        """Return the answer to inputs that the features have made of a state.
 
         Args:
-            kicks: (n,) places of the situations of which to answer on kicks and tackles, too; None for all. Who knows
-                where one was given saves most of the time by it. The paper's network answers all at once.
+            inputs: (batch, columns) normalised.
+            kicks: (n,) indices of the situations whose kicks and tackles are wanted; None for all. Leaving out the
+                others saves most of the time. A point head always answers all.
         """
         if kicks is None or self.config.head == "point":
-            return self.head(self.trunk(inputs))
-        return self.head(self.trunk(inputs, kicks=kicks))
+            answer: Answer = self.head(self.trunk(inputs))
+        else:
+            answer = self.head(self.trunk(inputs, kicks=kicks))
+        return answer
 
-    def kicks(self, inputs: Tensor) -> Any:
-        """What a `MixtureHead` answers on kicks and tackles alone, for its ``kick_loss``."""
-        head, trunk = cast(MixtureHead, self.head), cast(AimedTrunk, self.trunk)
-        return head.kicks(trunk.at_ball(inputs))
+    def loss(self, answer: Any, target: Target, **settings: Any) -> Loss:
+        """Return the training error of an answer of this clone; ``settings`` as in the head's ``loss``."""
+        return self.head.loss(answer, target, **settings)
+
+    def kick_loss(self, inputs: Tensor, target: Target, *, of: int) -> Tensor:
+        """Return the error of kicks and tackles alone, summed over the samples and divided by ``of``.
+
+        Args:
+            inputs: (batch, columns) normalised. target: kicks and tackles only.
+        """
+        head, trunk = cast(MixtureHead, self.head), cast(EgocentricTrunk, self.trunk)
+        return head.kick_loss(head.kicks(trunk.at_ball(inputs)), target, of=of)
 
     def forward(self, state: State) -> Prediction:
-        return self.head.point(self.output(state))
+        return self.answer(state).point()
 
     @torch.no_grad()
     def predict(self, state: State) -> tuple[Tensor, Tensor]:
@@ -152,9 +168,9 @@ class Clone(nn.Module):
         return prediction.logits.softmax(1), prediction.parameters
 
 
-def _trunk(config: ModelConfig, features: PaperFeatures | EgocentricFeatures) -> nn.Sequential | AimedTrunk:
+def _trunk(config: ModelConfig, features: PaperFeatures | EgocentricFeatures) -> nn.Sequential | EgocentricTrunk:
     if isinstance(features, EgocentricFeatures):
-        return AimedTrunk(config, features)
+        return EgocentricTrunk(config, features)
     return layers((len(features.names), *config.hidden), _ACTIVATIONS[config.activation], config.dropout)
 
 

@@ -16,7 +16,7 @@ BLOCKS = (
 HEADS = ("point", "mixture")
 """Forms of the answer: the paper's point, or a distribution of every parameter."""
 ATTENTION_HEADS = 4
-"""Of `crowd.Crowd`."""
+"""Of `crowd.PlayerEncoder`."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
 """Hidden activations."""
 
@@ -31,12 +31,12 @@ class ModelConfig:
         all_types: groups of type parameters to add for all 22 players: movement, kick, stamina. Only of the paper's.
         blocks: blocks that decide on the command, see `BLOCKS`. Only of the relative inputs, as all that follows.
         kick_blocks: blocks that decide where a kick goes.
-        aims: places on the pitch that the network supposes a player to make for; see `aims.Aims`.
+        aims: places on the pitch that the network supposes a player to make for; see `aims.TargetPoints`.
         aim_hidden: widths of the layers that find them.
         parameter_hidden: widths of the layers that find power and direction of dashes and turns.
         kick_hidden: widths of the layers that decide where a kick goes.
         kick_dropout: `dropout` of these, of which there are few examples.
-        kick_attention: numbers by which each other player is known to these; see `crowd.Crowd`. A multiple of
+        kick_attention: numbers by which each other player is known to these; see `crowd.PlayerEncoder`. A multiple of
             ATTENTION_HEADS; 0 for no such layers.
         hidden: widths of the hidden layers.
         activation: see `ACTIVATIONS`.

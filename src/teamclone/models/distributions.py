@@ -24,7 +24,7 @@ CLIPPED = 1e-2
 """An argument so close to its bound, in its unit, was clipped to it."""
 
 
-MOST = 128
+MEDOID_COMPONENTS = 128
 """Components among which a median is looked for: those with the greatest shares."""
 
 
@@ -121,7 +121,7 @@ def mirrored(angles: Mixture) -> Mixture:
     return angles._replace(centre=-angles.centre)
 
 
-def side_by_side(parts: Sequence[Mixture]) -> Mixture:
+def concatenate(parts: Sequence[Mixture]) -> Mixture:
     """One mixture of the components of several, whose shares are known beside one another."""
     return Mixture(*(torch.cat(columns, 1) for columns in zip(*parts, strict=True)))
 
@@ -129,16 +129,16 @@ def side_by_side(parts: Sequence[Mixture]) -> Mixture:
 def merged(parts: Sequence[Mixture]) -> Mixture:
     """One mixture of the components of several, each with its share divided by their number."""
     shares = [part._replace(logits=torch.log_softmax(part.logits, 1)) for part in parts]
-    return side_by_side(shares)
+    return concatenate(shares)
 
 
-def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
+def weighted_medoid(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
     """(batch,) the centre with the least expected distance to all: the median among the components.
 
     A mean would lie between left and right, where nobody kicks.
     """
-    if centre.shape[1] > MOST:
-        chosen = logits.topk(MOST, dim=1).indices
+    if centre.shape[1] > MEDOID_COMPONENTS:
+        chosen = logits.topk(MEDOID_COMPONENTS, dim=1).indices
         logits, centre = logits.gather(1, chosen), centre.gather(1, chosen)
     distance = centre[:, :, None] - centre[:, None, :]
     if angle:
@@ -146,7 +146,7 @@ def middle(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
     return centre.gather(1, _nearest_to_all(logits, distance.abs())).squeeze(1)
 
 
-def middle_place(logits: Tensor, x: Tensor, y: Tensor) -> Tensor:
+def weighted_medoid_place(logits: Tensor, x: Tensor, y: Tensor) -> Tensor:
     """(batch, 2) the same among places."""
     apart = torch.hypot(x[:, :, None] - x[:, None, :], y[:, :, None] - y[:, None, :])
     place = _nearest_to_all(logits, apart)
@@ -156,3 +156,66 @@ def middle_place(logits: Tensor, x: Tensor, y: Tensor) -> Tensor:
 def _nearest_to_all(logits: Tensor, apart: Tensor) -> Tensor:
     """(batch, 1) the component with the least expected distance; ``apart`` is (batch, components, components)."""
     return (apart * logits.softmax(1)[:, :, None]).sum(1).argmin(1, keepdim=True)
+
+
+def mean_logits(logits: Sequence[Tensor]) -> Tensor:
+    """(batch, classes) logarithms of the mean probabilities."""
+    return torch.stack([torch.log_softmax(of, 1) for of in logits]).logsumexp(0) - math.log(len(logits))
+
+
+def class_of(degrees: Tensor, count: int) -> Tensor:
+    """(batch,) which of ``count`` directions, the first of them straight ahead, is the nearest."""
+    return torch.round(degrees * (count / 360.0)).long() % count
+
+
+def log_class(logits: Tensor, degrees: Tensor) -> Tensor:
+    """(batch,) log-likelihood of a direction, taken as even within its class."""
+    count = logits.shape[1]
+    chosen = torch.log_softmax(logits, 1).gather(1, class_of(degrees, count)[:, None]).squeeze(1)
+    return chosen - math.log(360.0 / count)
+
+
+def direction_of(logits: Tensor) -> Tensor:
+    """(batch,) degrees of the most probable direction."""
+    count = logits.shape[1]
+    degrees = logits.argmax(1).to(logits.dtype) * (360.0 / count)
+    return torch.where(degrees > 180.0, degrees - 360.0, degrees)
+
+
+def draw_component(logits: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Return (batch, 1) a component of each mixture, drawn with the probabilities of ``logits`` (batch, components)."""
+    return torch.multinomial(logits.softmax(1), 1, generator=generator)
+
+
+def draw_value(
+    parts: Mixture, component: Tensor, generator: torch.Generator | None, *, low: float, high: float
+) -> Tensor:
+    """Return (batch,) values of the components (batch, 1), clipped to ``low``..``high`` as in `clipped_terms`."""
+    centre, scale = parts.centre.gather(1, component), parts.scale.gather(1, component)
+    uniform = _uniform(centre, generator)
+    return (centre + scale * torch.logit(uniform)).squeeze(1).clamp(low, high)
+
+
+def draw_angle(
+    parts: Mixture, component: Tensor, generator: torch.Generator | None, *, factor: Tensor | None = None
+) -> Tensor:
+    """Return (batch,) degrees of the components (batch, 1), distributed as in `angle_terms`."""
+    centre, scale = parts.centre.gather(1, component), parts.scale.gather(1, component)
+    # A component ends half a turn to each side of its centre.
+    ratio = torch.tanh(math.pi / (2 * scale)) * (2 * _uniform(centre, generator) - 1)
+    angle = wrap(centre + 2 * scale * torch.atanh(ratio)).squeeze(1) / DEGREE
+    return angle if factor is None else (angle * factor).clamp(-180.0, 180.0)
+
+
+def draw_direction(logits: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Return (batch,) degrees of a class (batch, classes), even within the class as in `log_class`."""
+    step = 360.0 / logits.shape[1]
+    component = draw_component(logits, generator)
+    degrees = (component + _uniform(component.to(logits.dtype), generator) - 0.5).squeeze(1) * step
+    return torch.where(degrees > 180.0, degrees - 360.0, degrees)
+
+
+def _uniform(like: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Return random numbers between 0 and 1, neither of them included, of the shape of ``like``."""
+    values = torch.rand(like.shape, generator=generator, device=like.device, dtype=like.dtype)
+    return values.clamp(1e-6, 1 - 1e-6)

@@ -39,7 +39,7 @@ class Loss(NamedTuple):
 
 
 @cache
-def on(device: torch.device, commands: tuple[str, ...] = CLONED) -> tuple[Tensor, Tensor, Tensor]:
+def parameter_layout(device: torch.device, commands: tuple[str, ...] = CLONED) -> tuple[Tensor, Tensor, Tensor]:
     """Limit, argument and kind of the parameters of commands, (parameters,) each, on a device.
 
     A limit, in power, degrees and metres, projects onto [-1, 1]. They are copied there once: a copy makes a GPU wait.
@@ -53,12 +53,12 @@ def on(device: torch.device, commands: tuple[str, ...] = CLONED) -> tuple[Tensor
 
 def issued(kind: Tensor, commands: tuple[str, ...] = CLONED) -> Tensor:
     """(batch, parameters) bool: which belong to the command; ``kind`` is (batch,), index into ``commands``."""
-    return on(kind.device, commands)[2] == kind[:, None]
+    return parameter_layout(kind.device, commands)[2] == kind[:, None]
 
 
 def projected_parameters(target: Target, commands: tuple[str, ...] = CLONED) -> Tensor:
     """(batch, parameters) in [-1, 1]: those of the command given, zero for those of other commands (Table II)."""
-    limits, argument, _ = on(target.kind.device, commands)
+    limits, argument, _ = parameter_layout(target.kind.device, commands)
     values = target.parameters.index_select(1, argument) / limits
     return torch.where(issued(target.kind, commands), values, 0.0)
 

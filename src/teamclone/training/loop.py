@@ -21,8 +21,9 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.models.answer import Answer
 from teamclone.models.clone import Clone
-from teamclone.models.heads.mixture import WITH_BALL, MixtureHead, with_ball
+from teamclone.models.heads.mixture import WITH_BALL, with_ball
 from teamclone.models.loss import Balance, ParameterLoss
 from teamclone.system.files import write_atomic
 from teamclone.training.batches import Feed
@@ -132,7 +133,7 @@ def train(
         group.share_weights(model)
         answer_of = partial(answer, model, precision=precision)
         loss_of = partial(
-            model.head.loss,
+            model.loss,
             parameter_loss=cast(ParameterLoss, config.train.parameter_loss),
             weight=config.train.parameter_weight,
             aim_weight=config.train.aim_weight,
@@ -176,15 +177,14 @@ def train(
                 error = loss.total
                 for kick_inputs, kick_target, whole_kicks in islice(kick_batches, 1):
                     with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bf16"):
-                        kicked = model.kicks(kick_inputs)
-                    taught = cast(MixtureHead, model.head).kick_loss(kicked, kick_target, of=len(whole_kicks))
+                        taught = model.kick_loss(kick_inputs, kick_target, of=len(whole_kicks))
                     error = error + config.train.parameter_weight * taught
                 optimiser.zero_grad(set_to_none=True)
                 error.backward()  # type: ignore[no-untyped-call]
                 group.add_up_gradients(model)
                 optimiser.step()
                 with torch.no_grad():
-                    scores.add(loss, model.head.point(output), target, batch=len(whole))
+                    scores.add(loss, output.point(), target, batch=len(whole))
                 on_progress(Progress(epoch, config.train.epochs, batch, batches, None))
             record: dict[str, Any] = {"epoch": epoch, "samples": len(order)}
             record |= {f"train_{name}": value for name, value in scores.table(group).items()}
@@ -194,9 +194,9 @@ def train(
             with torch.no_grad():
                 for inputs, target, whole in feed.batches(validation_rows, batch_size):
                     output = answer_of(inputs, kicks=with_ball(target))
-                    scores.add(loss_of(output, target, whole=whole), model.head.point(output), target, batch=len(whole))
+                    scores.add(loss_of(output, target, whole=whole), output.point(), target, batch=len(whole))
                     if config.train.calibrate:
-                        calibration.add(model.head.logits(output), target.kind)
+                        calibration.add(output.raw_logits, target.kind)
             record |= {f"validation_{name}": value for name, value in scores.table(group).items()}
             if config.train.calibrate:
                 record["temperature"], gained = calibration.fit(group)
@@ -215,17 +215,18 @@ def train(
     return run
 
 
-def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kicks: Tensor | None = None) -> Any:
-    """What the head answers to normalised inputs, as `Clone.output` does but for rounding; ``kicks`` as there."""
+def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kicks: Tensor | None = None) -> Answer:
+    """Return the answer to normalised inputs, equal to `Clone.answer_inputs` but for rounding; ``kicks`` as there."""
     if precision == "bf16":
         with torch.autocast(inputs.device.type, torch.bfloat16):
-            return model.answer(inputs, kicks=kicks)
+            return model.answer_inputs(inputs, kicks=kicks)
     able = isinstance(model.trunk, nn.Sequential) and model.config.activation in ONEDNN_ACTIVATIONS
     if able and inputs.device.type == "cpu" and len(inputs) and not model.config.dropout:
         # oneDNN instead of MKL, which takes twice the time on AMD, where it leaves AVX-512 unused.
         hidden: Tensor = model.trunk(inputs.to_mkldnn()).to_dense()
-        return model.head(hidden)
-    return model.answer(inputs, kicks=kicks)
+        answered: Answer = model.head(hidden)
+        return answered
+    return model.answer_inputs(inputs, kicks=kicks)
 
 
 def _kick_order(config: TrainConfig, rows: NDArray[np.int64], *, epoch: int, batches: int) -> NDArray[np.int64]:

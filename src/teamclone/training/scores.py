@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from teamclone.models.heads.mixture import Prediction
-from teamclone.models.loss import Loss, issued, on, projected_parameters
+from teamclone.models.answer import Prediction
+from teamclone.models.loss import Loss, issued, parameter_layout, projected_parameters
 from teamclone.rcss.commands import CLONED
 from teamclone.training.group import ALONE, Group
 from teamclone.world.state import Target
@@ -26,7 +26,7 @@ class Scores:
     def add(self, loss: Loss, prediction: Prediction, target: Target, *, batch: int | None = None) -> None:
         """Count one batch, or a process's share of a ``batch`` of so many samples."""
         mask = issued(target.kind, self.commands)
-        limits = on(mask.device, self.commands)[0]
+        limits = parameter_layout(mask.device, self.commands)[0]
         error = (prediction.parameters / limits - projected_parameters(target, self.commands)).abs()
         n = len(mask) if batch is None else batch
         parts = (

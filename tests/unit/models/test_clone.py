@@ -83,7 +83,7 @@ def test_overfits_sixty_four_samples() -> None:
     model.inputs.fit([model.inputs.project(state)])
     optimiser = torch.optim.Adam(model.parameters(), lr=1e-3)
     for _ in range(200):
-        loss = model.head.loss(model.output(state), target)
+        loss = model.loss(model.answer(state), target)
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()
@@ -148,12 +148,12 @@ def test_kicks_are_decided_on_their_own_blocks() -> None:
     assert torch.equal(logits, other_logits)
     assert torch.equal(before[:, :3], after[:, :3])
     assert not torch.equal(before[:, 3:5], after[:, 3:5])
-    for one, two in zip(model.output(state).kick, model.output(other).kick, strict=True):
+    for one, two in zip(model.answer(state).distribution.kick, model.answer(other).distribution.kick, strict=True):
         assert not torch.equal(one.tackle, two.tackle)
 
 
 def kick_logits(model: Clone, state: State) -> Tensor:
-    logits: Tensor = model.output(state).kick[0].power.logits
+    logits: Tensor = model.answer(state).distribution.kick[0].power.logits
     return logits
 
 
@@ -190,7 +190,7 @@ def test_a_mixture_overfits_sixty_four_samples() -> None:
     optimiser = torch.optim.Adam(model.parameters(), lr=5e-3)
     likelihoods = []
     for _ in range(120):
-        loss = model.head.loss(model.answer(inputs), target)
+        loss = model.loss(model.answer_inputs(inputs), target)
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()
@@ -214,7 +214,7 @@ def test_every_weight_of_the_mixture_learns() -> None:
     model = Clone(RELATIVE)
     state = situations(64)
     model.inputs.fit([model.inputs.project(state)])
-    model.head.loss(model.output(state), likely_target(state)).total.backward()
+    model.loss(model.answer(state), likely_target(state)).total.backward()
     for name, weights in model.named_parameters():
         assert weights.grad is not None, name
         assert weights.grad.isfinite().all(), name
@@ -234,17 +234,17 @@ def test_parameters_teach_neither_the_layers_of_the_command_nor_the_aims() -> No
     state = situations(64)
     target = likely_target(state)
     model.inputs.fit([model.inputs.project(state)])
-    output = model.output(state)
+    output = model.answer(state)
     by_kind = {
         CommandKind.DASH: {"trunk.parameters_of", "head.dash", "head.incomes", "head.powers"},
         CommandKind.TURN: {"trunk.parameters_of", "head.turn"},
         CommandKind.KICK: {"trunk.kick", "head.kick"},
         CommandKind.TACKLE: {"trunk.kick", "head.tackle"},
     }
-    likelihood = model.head.log_likelihood(output, target)
+    likelihood = output.log_likelihood(target)
     for index, kind in enumerate(CLONED_KINDS):
         assert taught(likelihood[target.kind == index].sum(), model) == by_kind[kind]
-    loss = model.head.loss(output, target, weight=1.0)
+    loss = model.loss(output, target, weight=1.0)
     assert taught(loss.parameters, model) == set.union(*by_kind.values())
     assert taught(loss.cross_entropy, model) == {"trunk.aims", "trunk.command", "head.command"}
 
@@ -254,18 +254,18 @@ def test_turns_teach_the_aims_and_nothing_else_through_their_own_bell() -> None:
     state = situations(64)
     target = likely_target(state)
     model.inputs.fit([model.inputs.project(state)])
-    output = model.output(state)
-    plain, aimed = (model.head.loss(output, target, aim_weight=weight) for weight in (0.0, 0.5))
+    output = model.answer(state)
+    plain, aimed = (model.loss(output, target, aim_weight=weight) for weight in (0.0, 0.5))
     assert aimed.parameters == plain.parameters
     assert aimed.total > plain.total
     nothing_else = Balance(weight=torch.zeros(4), shift=torch.zeros(4))
-    alone = model.head.loss(output, target, weight=0.0, aim_weight=0.5, balance=nothing_else)
+    alone = model.loss(output, target, weight=0.0, aim_weight=0.5, balance=nothing_else)
     assert alone.total.item() == pytest.approx((aimed.total - plain.total).item(), rel=1e-4)
     assert taught(alone.total, model) == {"trunk.aims"}
     turns = target.kind == CLONED_KINDS.index(CommandKind.TURN)
     without = Target(target.kind[~turns], target.parameters[~turns])
-    others = model.output(state.select(~turns))
-    assert model.head.loss(others, without, aim_weight=0.5).total == model.head.loss(others, without).total
+    others = model.answer(state.select(~turns))
+    assert model.loss(others, without, aim_weight=0.5).total == model.loss(others, without).total
 
 
 @pytest.mark.parametrize("config", [SMALL, replace(SMALL, members=2), MODELS["plan"]], ids=("one", "two", "plan"))
@@ -279,10 +279,10 @@ def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> 
     rows = with_ball(target)
     assert rows.tolist() == [row for row in range(40) if row % 4 >= 2]
     with torch.no_grad():
-        whole, asked = model.answer(inputs), model.answer(inputs, kicks=rows)
-        likelihoods = [model.head.log_likelihood(output, target) for output in (whole, asked)]
-        losses = [torch.stack(model.head.loss(output, target, aim_weight=0.3)) for output in (whole, asked)]
-        points = [model.head.point(output) for output in (whole, asked)]
+        whole, asked = model.answer_inputs(inputs), model.answer_inputs(inputs, kicks=rows)
+        likelihoods = [output.log_likelihood(target) for output in (whole, asked)]
+        losses = [torch.stack(model.loss(output, target, aim_weight=0.3)) for output in (whole, asked)]
+        points = [output.point() for output in (whole, asked)]
     torch.testing.assert_close(*likelihoods, atol=1e-4, rtol=1e-4)
     torch.testing.assert_close(*losses, atol=1e-4, rtol=1e-4)
     torch.testing.assert_close(points[0].logits, points[1].logits)
@@ -299,8 +299,8 @@ def test_a_batch_without_kicks_learns(config: ModelConfig) -> None:
     state = situations(12)
     target = likely_target(state)._replace(kind=torch.arange(12) % 2)
     model.inputs.fit([model.inputs.project(state)])
-    loss = model.head.loss(model.answer(model.features(state), kicks=with_ball(target)), target)
-    whole = model.head.loss(model.output(state), target)
+    loss = model.loss(model.answer_inputs(model.features(state), kicks=with_ball(target)), target)
+    whole = model.loss(model.answer(state), target)
     assert loss.total.item() == pytest.approx(whole.total.item(), rel=1e-4)
     loss.total.backward()
     for name, weights in model.named_parameters():

@@ -19,11 +19,11 @@ from teamclone.models.distributions import (
     halves,
     log_likelihood,
     merged,
-    middle,
-    middle_place,
     mirrored,
     power_terms,
     scale_of,
+    weighted_medoid,
+    weighted_medoid_place,
     wrap,
 )
 
@@ -75,7 +75,9 @@ def test_places_with_their_bounds_make_up_one() -> None:
 
 def test_the_middle_place_is_that_of_a_component() -> None:
     x, y = double(-40.0, -40.0, -10.0)[None], double(13.0, -13.0, 0.0)[None]
-    chosen = [middle_place(torch.log(double(*shares))[None], x, y)[0].tolist() for shares in ((5, 4, 1), (4, 5, 1))]
+    chosen = [
+        weighted_medoid_place(torch.log(double(*shares))[None], x, y)[0].tolist() for shares in ((5, 4, 1), (4, 5, 1))
+    ]
     assert chosen == [[-40, 13], [-40, -13]]
 
 
@@ -164,7 +166,7 @@ def test_middle_has_the_least_expected_distance(angle: bool) -> None:
     generator = torch.Generator().manual_seed(0)
     logits = 2 * torch.randn(50, 7, generator=generator)
     centre = torch.randn(50, 7, generator=generator) * (2 if angle else 50)
-    got = middle(logits, centre, angle=angle)
+    got = weighted_medoid(logits, centre, angle=angle)
     for row in range(50):
         shares = logits[row].softmax(0).tolist()
         centres = centre[row].tolist()
@@ -188,7 +190,7 @@ def test_middle_of_powers_is_the_weighted_median(weights: list[float], data: st.
     count = len(weights)
     centres = data.draw(st.lists(st.integers(0, 100), min_size=count, max_size=count))
     logits = torch.tensor([weights], dtype=torch.float64).log()
-    got = float(middle(logits, torch.tensor([centres], dtype=torch.float64), angle=False))
+    got = float(weighted_medoid(logits, torch.tensor([centres], dtype=torch.float64), angle=False))
     below = sum(weight for weight, centre in zip(weights, centres, strict=True) if centre < got)
     above = sum(weight for weight, centre in zip(weights, centres, strict=True) if centre > got)
     assert max(below, above) <= sum(weights) / 2 + 1e-9
@@ -196,10 +198,10 @@ def test_middle_of_powers_is_the_weighted_median(weights: list[float], data: st.
 
 def test_middle_is_never_between_left_and_right() -> None:
     logits, centre = double(0.0, 0.0, 0.0)[None], double(-60, 60, 61)[None] * DEGREE
-    assert float(middle(logits, centre, angle=True)) / DEGREE == pytest.approx(60)
+    assert float(weighted_medoid(logits, centre, angle=True)) / DEGREE == pytest.approx(60)
     # Across behind, -179 and 179 are neighbours.
     logits, centre = double(0.0, 0.0, 0.0)[None], double(-179, 179, 0)[None] * DEGREE
-    assert abs(float(middle(logits, centre, angle=True))) / DEGREE == pytest.approx(179)
+    assert abs(float(weighted_medoid(logits, centre, angle=True))) / DEGREE == pytest.approx(179)
 
 
 def test_scales_are_bounded_and_about_typical_for_zero() -> None:

@@ -238,8 +238,8 @@ def test_a_step_on_the_quick_way_is_a_plain_step_but_for_rounding(real: Dataset,
     gradients = []
     for plain in (True, False):
         (batch,) = Feed(real, model, CPU, ALONE).batches(rows, n)
-        output = model.output(real.state(rows)) if plain else answer(model, batch.inputs, precision="fp32")
-        loss = model.head.loss(output, real.target(rows) if plain else batch.target)
+        output = model.answer(real.state(rows)) if plain else answer(model, batch.inputs, precision="fp32")
+        loss = model.loss(output, real.target(rows) if plain else batch.target)
         model.zero_grad()
         loss.total.backward()
         gradients.append([loss.total.detach(), *(weights.grad.clone() for weights in model.parameters())])

@@ -17,7 +17,7 @@ from teamclone.models.inputs.geometry import MATES, geometry_of, mates_of, ways_
 from teamclone.planner.plan import WAYS
 from teamclone.rcss import pitch
 
-FREE = 3
+BALL_COMPONENTS = 3
 """Components that begin at the ball itself."""
 DRIBBLES = (1, 2, 3, 4, 5, 7, 10)
 """Cycles after which a dribbler wants the ball before him."""
@@ -27,7 +27,7 @@ TOUCH_M = 3.0
 """The same of a dribble, from where he then is."""
 AHEAD_M = 0.6
 """Where a dribbler likes to have the ball."""
-COUNT = MATES + 1 + FREE + len(DRIBBLES)
+N_COMPONENTS = MATES + 1 + BALL_COMPONENTS + len(DRIBBLES)
 USUAL_ERROR = 0.003
 """Metres per cycle by which the velocity of the ball misses what was planned, before training."""
 IMPOSSIBLE = -30.0
@@ -74,7 +74,9 @@ class Planned(nn.Module):
 
 
 class Kicks(nn.Module):
-    """Mixtures of power and direction of a kick, both with the shares of the same components, COUNT and those planned.
+    """Mixtures of power and direction of a kick; both share the weights of their components.
+
+    There are N_COMPONENTS, and with ``planned`` those of `Planned`.
 
     Args:
         width: of what a kick is decided on.
@@ -87,7 +89,7 @@ class Kicks(nn.Module):
 
     def __init__(self, width: int, target_width: int = 0, *, planned: bool = False) -> None:
         super().__init__()
-        self.layer = nn.Linear(width, 6 * COUNT)
+        self.layer = nn.Linear(width, 6 * N_COMPONENTS)
         self.target = nn.Linear(target_width, 6) if target_width else None
         self.planned = Planned(width) if planned else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
@@ -103,18 +105,18 @@ class Kicks(nn.Module):
         free = self._free(hidden, geometry, targets)
         if self.planned is None:
             return free
-        power, angle = (mixture.side_by_side(pair) for pair in zip(free, self.planned(hidden, geometry), strict=True))
+        power, angle = (mixture.concatenate(pair) for pair in zip(free, self.planned(hidden, geometry), strict=True))
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:
         """Those that the network moves about."""
-        raw = self.layer(hidden).float().view(-1, 6, COUNT)
+        raw = self.layer(hidden).float().view(-1, 6, N_COMPONENTS)
         if self.target is not None and targets is not None:
             # The components begin with the team mates and the goal.
-            raw = raw + functional.pad(self.target(targets).float().transpose(1, 2), (0, COUNT - MATES - 1))
+            raw = raw + functional.pad(self.target(targets).float().transpose(1, 2), (0, N_COMPONENTS - MATES - 1))
         with torch.autocast(hidden.device.type, enabled=False):
             logits, ahead, aside, speed, power_scale, angle_scale = raw.unbind(1)
-            aimed = COUNT - len(DRIBBLES)
+            aimed = N_COMPONENTS - len(DRIBBLES)
             wanted = torch.cat(
                 [
                     self._aimed(ahead[:, :aimed], aside[:, :aimed], speed[:, :aimed], geometry),
@@ -132,7 +134,7 @@ class Kicks(nn.Module):
         """(batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""
         mates = mates_of(geometry)
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)[:, None]
-        base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, FREE, -1)], 1)
+        base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, BALL_COMPONENTS, -1)], 1)
         way = base + LEAD_M * torch.stack([ahead, aside], -1) - ball
         direction = way / torch.sqrt(way.square().sum(-1, keepdim=True) + 1e-6)
         return direction * (geometry_of(geometry, "ball_speed_max")[0] * torch.sigmoid(speed))[..., None]

@@ -17,8 +17,8 @@ from teamclone.models.config import ATTENTION_HEADS
 from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, geometry_of, others_of
 from teamclone.rcss import pitch
 
-COLUMNS = 17
-"""Inputs of each: `Crowd.columns`."""
+PLAYER_COLUMNS = 17
+"""Inputs of each: `PlayerEncoder.columns`."""
 TARGETS = MATES + 1
 """Whom or what to kick to: the team mates, then the goal."""
 PASS_SPEED = 2.7
@@ -29,7 +29,7 @@ NEVER_CYCLES = 20.0
 _THERE = OTHER.index("there")
 
 
-class Crowd(nn.Module):
+class PlayerEncoder(nn.Module):
     """What the others are to the player who acts.
 
     Args:
@@ -41,7 +41,7 @@ class Crowd(nn.Module):
 
     def __init__(self, width: int, seen: int) -> None:
         super().__init__()
-        self.other = nn.Sequential(nn.Linear(COLUMNS, width), nn.ReLU(), nn.Linear(width, width))
+        self.other = nn.Sequential(nn.Linear(PLAYER_COLUMNS, width), nn.ReLU(), nn.Linear(width, width))
         self.situation = nn.Linear(seen, width)
         self.before, self.between, self.after = (nn.LayerNorm(width) for _ in range(3))
         self.ask = nn.Linear(width, 3 * width)
@@ -72,7 +72,7 @@ class Crowd(nn.Module):
         return each.mean(1), torch.cat([each[:, :MATES], each[:, OTHERS:]], 1)
 
     def columns(self, geometry: Tensor) -> Tensor:
-        """(batch, OTHERS + 1, COLUMNS): the others, then the goal, as seen from the ball."""
+        """(batch, OTHERS + 1, PLAYER_COLUMNS): the others, then the goal, as seen from the ball."""
         others = others_of(geometry)
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)
         decay = geometry_of(geometry, "ball_decay")[0][..., None]

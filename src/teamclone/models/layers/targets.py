@@ -18,7 +18,7 @@ from torch.nn import functional
 from teamclone.models.inputs.geometry import geometry_of
 from teamclone.rcss import pitch
 
-COLUMNS = 10
+TARGET_COLUMNS = 10
 """Inputs that each place gives."""
 TURN_DEG = 15.0
 """Agents of the league dash without a turn at what is closer to straight ahead."""
@@ -34,7 +34,7 @@ def layers(widths: Sequence[int], activation: type[nn.Module], dropout: float = 
     return nn.Sequential(*parts)
 
 
-class Aims(nn.Module):
+class TargetPoints(nn.Module):
     """``count`` places; the first half of them stays a metre behind the offside line, as players do.
 
     Args:
@@ -63,9 +63,9 @@ class Aims(nn.Module):
             context: (batch, width). geometry: (batch, len(GEOMETRY)).
 
         Returns:
-            (batch, COLUMNS * count) inputs; (batch, count) radians from the body to the place, from where the player
-            comes to rest; (batch, count) dash power after which he rolls as far as from there to the place. So agents
-            of the league reckon, though it counts what he rolls already twice.
+            (batch, TARGET_COLUMNS * count) inputs; (batch, count) radians from the body to the place, from where the
+            player comes to rest; (batch, count) dash power after which the player rolls as far as from there to the
+            place. So agents of the league reckon, though it counts the present velocity twice.
         """
         if not self.count:
             nothing = context.new_zeros(context.shape[0], 0)

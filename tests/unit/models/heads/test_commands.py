@@ -14,7 +14,8 @@ from torch.utils._pytree import tree_map
 
 from teamclone.models.clone import Clone
 from teamclone.models.config import ModelConfig
-from teamclone.models.heads.mixture import CATCH_DIRECTIONS, CATCH_EDGE_DEG, MixtureHead
+from teamclone.models.heads.ensemble import EnsembleAnswer
+from teamclone.models.heads.mixture import CATCH_DIRECTIONS, CATCH_EDGE_DEG, MixtureAnswer, MixtureHead
 from teamclone.rcss.commands import CLONED, PARAMETERS, REPERTOIRE, parameters_of
 from teamclone.rcss.pitch import MAX_X, MAX_Y
 from teamclone.world.channels import CHANNEL
@@ -70,17 +71,19 @@ def test_answers_of_any_commands(config: ModelConfig, further: tuple[str, ...]) 
         assert torch.allclose(one[0], whole[4], atol=1e-2, rtol=1e-3)
 
 
-def repeated(output: Any, n: int) -> Any:
+def repeated(answer: Any, n: int) -> MixtureAnswer:
     """The answer to one situation as that to ``n`` equal ones."""
-    return tree_map(lambda of: None if of is None else of.expand(n, *of.shape[1:]), output)
+    alone = answer.merged if isinstance(answer, EnsembleAnswer) else answer
+    every = tree_map(lambda of: None if of is None else of.expand(n, *of.shape[1:]), alone.distribution)
+    return MixtureAnswer(every, alone.temperature)
 
 
 def likelihoods(model: Clone, kind: int, first: Tensor, second: Tensor) -> Tensor:
     """(n,) of arguments of a command in one situation, in double precision."""
     with torch.no_grad():
-        output = repeated(model.output(situations(1, seed=3)), len(first))
+        output = repeated(model.answer(situations(1, seed=3)), len(first))
         target = Target(torch.full((len(first),), kind), torch.stack([first, second], 1).float())
-        likelihood: Tensor = model.head.log_likelihood(output, target).double().exp()
+        likelihood: Tensor = output.log_likelihood(target).double().exp()
     return likelihood
 
 
@@ -89,10 +92,10 @@ def test_catch_directions_make_up_one(members: int) -> None:
     model = fitted(replace(MIXTURE, members=members), situations(50))
     degrees = torch.arange(-179.75, 180, 0.5)  # none between two classes
     with torch.no_grad():
-        output = model.output(situations(1, seed=3))
-        many = [repeated(of, len(degrees)) for of in output] if members > 1 else repeated(output, len(degrees))
+        output = model.answer(situations(1, seed=3))
+        many = repeated(output, len(degrees))
         target = Target(torch.full((len(degrees),), CATCH), torch.stack([degrees, 0 * degrees], 1))
-        assert float(model.head.log_likelihood(many, target).exp().sum() * 0.5) == pytest.approx(1, abs=1e-4)
+        assert float(many.log_likelihood(target).exp().sum() * 0.5) == pytest.approx(1, abs=1e-4)
 
 
 def test_places_of_a_move_make_up_one() -> None:
@@ -133,7 +136,7 @@ def test_further_commands_are_learned(config: ModelConfig) -> None:
     inputs, target = model.features(state), target_of(state)
     optimiser = torch.optim.Adam(model.parameters(), lr=3e-3)
     for _ in range(120):
-        loss = model.head.loss(model.answer(inputs), target, parameter_loss="masked")
+        loss = model.loss(model.answer_inputs(inputs), target, parameter_loss="masked")
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()
@@ -150,7 +153,7 @@ def test_further_commands_are_learned(config: ModelConfig) -> None:
 def test_every_weight_of_further_commands_learns() -> None:
     state = situations(70)
     model = fitted(MIXTURE, state)
-    model.head.loss(model.output(state), target_of(state)).total.backward()
+    model.loss(model.answer(state), target_of(state)).total.backward()
     for name, weights in model.head.named_parameters():
         if name.split(".")[0] in ("catch", "catch_edges", "catch_sharpness", "move"):
             assert weights.grad is not None, name
@@ -171,7 +174,7 @@ def test_a_catch_has_the_ball_at_an_edge_of_its_area(bearing: float, expected: f
     angle = math.radians(30 + bearing)
     state.ball[0, :2] = me[:2] + torch.tensor([math.cos(angle), math.sin(angle)])
     with torch.no_grad():
-        catch = model.output(state).catch
+        catch = model.answer(state).distribution.catch
     shares = torch.softmax(catch, 1)[0]
     width = 360 / CATCH_DIRECTIONS
     degrees = torch.arange(CATCH_DIRECTIONS) * width
@@ -207,7 +210,7 @@ class Exported(torch.nn.Module):
 def test_a_model_of_all_commands_can_be_exported() -> None:
     def inputs(n: int) -> tuple[Tensor, ...]:
         state = situations(n, seed=n)
-        return (*state[:4], state.mode, state.mode_cycles)
+        return (state.ball, state.players, state.types, state.actor, state.mode, state.mode_cycles)
 
     model = Exported(fitted(MIXTURE, situations(50)))
     batch = torch.export.Dim("batch", min=1)

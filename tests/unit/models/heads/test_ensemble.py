@@ -74,8 +74,8 @@ def test_the_likelihood_of_parameters_is_the_mean_over_members(dataset: Dataset)
     together, alone = ensemble(MIXTURE, 3)
     rows = np.arange(200)
     state, target = dataset.state(rows), dataset.target(rows)
-    likelihood = together.head.log_likelihood(together.output(state), target)
-    each = torch.stack([model.head.log_likelihood(model.output(state), target) for model in alone])
+    likelihood = together.answer(state).log_likelihood(target)
+    each = torch.stack([model.answer(state).log_likelihood(target) for model in alone])
     # Of a dash power and direction are averaged apart; a turn has one parameter, a kick's two share their components.
     once = target.kind != 0
     assert torch.allclose(likelihood[once], (each.logsumexp(0) - np.log(3))[once], atol=1e-4)
@@ -86,11 +86,11 @@ def test_each_member_learns_as_if_alone(dataset: Dataset, config: ModelConfig) -
     together, alone = ensemble(config, 2)
     rows = np.arange(64)
     state, target = dataset.state(rows), dataset.target(rows)
-    loss = together.train().head.loss(together.output(state), target, weight=0.5)
+    loss = together.train().loss(together.answer(state), target, weight=0.5)
     loss.total.backward()
     totals = []
     for index, model in enumerate(alone):
-        single = model.train().head.loss(model.output(state), target, weight=0.5)
+        single = model.train().loss(model.answer(state), target, weight=0.5)
         single.total.backward()
         totals.append(single.total.item())
         mine = (*together.trunk.members[index].parameters(), *together.head.members[index].parameters())
@@ -106,8 +106,8 @@ def test_the_error_of_the_answer_is_below_that_of_the_members(dataset: Dataset, 
     state, target = dataset.state(np.arange(200)), dataset.target(np.arange(200))
     probability = together.predict(state)[0].gather(1, target.kind[:, None])
     with torch.no_grad():
-        answer = together.head.loss(together.output(state), target)
-        members = together.train().head.loss(together.output(state), target)
+        answer = together.loss(together.answer(state), target)
+        members = together.train().loss(together.answer(state), target)
     assert float(answer.cross_entropy) == pytest.approx(float(-probability.log().mean()), rel=1e-5)
     assert answer.cross_entropy < members.cross_entropy
 
@@ -119,4 +119,4 @@ def test_one_temperature_for_all(dataset: Dataset, config: ModelConfig) -> None:
     before = together(state).logits
     together.head.temperature.fill_(2.0)
     assert torch.allclose(together(state).logits, before / 2)
-    assert torch.allclose(together.head.logits(together.output(state)), before)
+    assert torch.allclose(together.answer(state).raw_logits, before)

@@ -15,12 +15,11 @@ from teamclone.models.config import ModelConfig
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
 from teamclone.models.heads.kick import (
     AHEAD_M,
-    BALL_SPEED_MAX,
-    COUNT,
+    BALL_COMPONENTS,
     DRIBBLES,
-    FREE,
     IMPOSSIBLE,
     LEAD_M,
+    N_COMPONENTS,
     TOUCH_M,
     USUAL_ERROR,
     Kicks,
@@ -32,7 +31,7 @@ from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 from teamclone.world.mirror import mirror_state, mirror_target
 from teamclone.world.state import State, Target
 
-GOAL, AIMED = MATES, MATES + 1 + FREE
+GOAL, AIMED = MATES, MATES + 1 + BALL_COMPONENTS
 """Places of the goal's component and of the first dribble."""
 USUAL = 1 / (1 + math.exp(-3))
 """What an output of 0 leaves of a typical scale."""
@@ -42,7 +41,7 @@ OUTPUTS = ("share", "ahead", "aside", "speed", "power", "direction")
 def geometry(**values: float) -> torch.Tensor:
     """One situation: the player at (10, -5) faces +y; the ball lies at (10, -4), unmoving; mates are where he is."""
     usual = {"x": 10, "y": -5, "cos": 0, "sin": 1, "decay": 0.4, "dash_gain": 0.006, "ball_x": 10, "ball_y": -4}
-    usual |= {"kick_gain": 0.02}
+    usual |= {"kick_gain": 0.02, "ball_decay": 0.94, "ball_speed_max": 3.0}
     usual |= {f"mate_{mate}_{axis}": usual[axis] for mate in range(MATES) for axis in "xy"}
     return torch.tensor([[float((usual | values).get(name, 0.0)) for name in GEOMETRY]])
 
@@ -54,7 +53,7 @@ def kick(*, component: int = 0, outputs: dict[str, float] | None = None, **value
         kicks.layer.weight.zero_()
         kicks.layer.bias.zero_()
         for name, value in (outputs or {}).items():
-            kicks.layer.bias.view(6, COUNT)[OUTPUTS.index(name), component] = value
+            kicks.layer.bias.view(6, N_COMPONENTS)[OUTPUTS.index(name), component] = value
         power, direction = kicks(torch.zeros(1, 3), geometry(**values))
     assert power.logits is direction.logits
     return [float(power.centre[0, component]), float(direction.centre[0, component]) / DEGREE]
@@ -82,7 +81,6 @@ def test_a_pass_at_half_speed() -> None:
     """An output of 0 is half of the ball's greatest speed, straight to the team mate."""
     got = kick(component=2, mate_2_x=30.0, mate_2_y=-4.0)
     assert got == pytest.approx([1.5 / 0.02, -90.0], abs=1e-2)
-    assert BALL_SPEED_MAX == 3.0
 
 
 def test_a_pass_stops_what_the_ball_does() -> None:
@@ -107,7 +105,7 @@ def test_a_free_kick_goes_where_its_outputs_say() -> None:
     """Seen from the ball: with no way at all the ball is stopped."""
     outputs = {"ahead": -0.25, "aside": 0.25}
     assert kick(component=GOAL + 1, outputs=outputs) == pytest.approx(needed(towards(7, -1, 1.5)), abs=1e-2)
-    assert kick(component=GOAL + FREE, ball_vy=0.8)[0] == pytest.approx(0.8 / 0.02, abs=0.1)
+    assert kick(component=GOAL + BALL_COMPONENTS, ball_vy=0.8)[0] == pytest.approx(0.8 / 0.02, abs=0.1)
 
 
 @pytest.mark.parametrize("number", range(len(DRIBBLES)))
@@ -147,8 +145,8 @@ def test_scales_are_typical() -> None:
         kicks.layer.weight.zero_()
         kicks.layer.bias.zero_()
         power, direction = kicks(torch.zeros(1, 3), geometry())
-    assert power.scale[0].tolist() == pytest.approx([LEAST_POWER + 5 * USUAL] * COUNT)
-    assert direction.scale[0].tolist() == pytest.approx([LEAST_ANGLE + 6 * DEGREE * USUAL] * COUNT)
+    assert power.scale[0].tolist() == pytest.approx([LEAST_POWER + 5 * USUAL] * N_COMPONENTS)
+    assert direction.scale[0].tolist() == pytest.approx([LEAST_ANGLE + 6 * DEGREE * USUAL] * N_COMPONENTS)
 
 
 # Left and right.
@@ -184,8 +182,8 @@ def test_each_way_that_is_planned_is_a_component() -> None:
     ways = {"pass": (1.2, 0.7), "hold": (-0.1, 0.2)}
     with torch.no_grad():
         power, direction = kicks(torch.zeros(1, 3), planned(ways))
-    assert power.logits.shape == direction.logits.shape == (1, COUNT + len(WAYS))
-    for place, name in enumerate(WAYS, COUNT):
+    assert power.logits.shape == direction.logits.shape == (1, N_COMPONENTS + len(WAYS))
+    for place, name in enumerate(WAYS, N_COMPONENTS):
         if name in ways:
             found = [float(power.centre[0, place]), float(direction.centre[0, place]) / DEGREE]
             assert found == pytest.approx(needed(ways[name], motion=(0.3, -0.2)), abs=0.1)
@@ -197,7 +195,7 @@ def test_each_way_that_is_planned_is_a_component() -> None:
     alone.load_state_dict(kicks.state_dict(), strict=False)
     with torch.no_grad():
         free, _ = alone(torch.zeros(1, 3), geometry(ball_vx=0.3, ball_vy=-0.2))
-    torch.testing.assert_close(power.centre[:, :COUNT], free.centre)
+    torch.testing.assert_close(power.centre[:, :N_COMPONENTS], free.centre)
 
 
 def test_errors_of_what_is_planned_are_of_the_ball_velocity() -> None:
@@ -208,7 +206,7 @@ def test_errors_of_what_is_planned_are_of_the_ball_velocity() -> None:
         kicks.planned.error[WAYS.index("pass")] = math.log(2.0)
         power, direction = kicks(torch.zeros(1, 3), planned({"pass": (1.2, 0.7), "run": (0.5, -0.2)}))
     for name, factor, added in (("pass", 2.0, math.hypot(0.9, 0.9)), ("run", 1.0, 0.2)):
-        place = COUNT + WAYS.index(name)
+        place = N_COMPONENTS + WAYS.index(name)
         error = factor * USUAL_ERROR
         assert power.scale[0, place].item() == pytest.approx(LEAST_POWER + error / 0.02)
         assert direction.scale[0, place].item() == pytest.approx(LEAST_ANGLE + error / added, rel=1e-2)
@@ -228,7 +226,7 @@ def assert_alike(one: Mixture, other: Mixture, *, turned: bool) -> None:
 def test_a_mirrored_situation_has_the_mirrored_kicks(model: Clone) -> None:
     state = situations(60)
     with torch.no_grad():
-        answers, turned = model.output(state).kick, model.output(mirrored(state)).kick
+        answers, turned = model.answer(state).distribution.kick, model.answer(mirrored(state)).distribution.kick
     for one, other in zip(answers, reversed(turned), strict=True):
         assert_alike(one.power, other.power, turned=False)
         assert_alike(one.direction, other.direction, turned=True)
@@ -248,8 +246,8 @@ def test_mirrored_kicks_are_as_likely(model: Clone) -> None:
     first = torch.where(kind == kick, power, (direction / 9).round() * 9)
     target = Target(kind, torch.stack([first, torch.where(kind == kick, direction, 0.0)], 1))
     with torch.no_grad():
-        likelihood = model.head.log_likelihood(model.output(state), target)
-        turned = model.head.log_likelihood(model.output(mirrored(state)), mirror_target(target))
+        likelihood = model.answer(state).log_likelihood(target)
+        turned = model.answer(mirrored(state)).log_likelihood(mirror_target(target))
     torch.testing.assert_close(likelihood, turned, atol=2e-2, rtol=1e-3)
 
 
@@ -278,7 +276,7 @@ def test_a_planned_tackle_is_trusted_as_far_as_training_says() -> None:
         doubted = model.predict(state)[1][:, place]
         head.planned_tackle.bias.fill_(30.0)
         trusted = model.predict(state)[1][:, place]
-        answers = model.output(state).kick
+        answers = model.answer(state).distribution.kick
     # On the left as on the right.
     for answer in answers:
         assert torch.equal(answer.tackle.argmax(1)[there], class_of(degrees, TACKLE_DIRECTIONS)[there])

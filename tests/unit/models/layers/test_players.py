@@ -11,7 +11,7 @@ from torch import Tensor
 
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.geometry import GEOMETRY, MATES, OTHER, OTHERS, others_of
-from teamclone.models.layers.players import COLUMNS, RUN_SPEED, TARGETS, Crowd
+from teamclone.models.layers.players import PLAYER_COLUMNS, RUN_SPEED, TARGETS, PlayerEncoder
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
 from teamclone.world.state import State
 
@@ -58,9 +58,9 @@ def test_who_is_not_there_is_all_zeros() -> None:
     assert others[there == 0].abs().max() == 0
 
 
-def crowd(width: int = 8) -> Crowd:
+def crowd(width: int = 8) -> PlayerEncoder:
     torch.manual_seed(0)
-    return Crowd(width, 3)
+    return PlayerEncoder(width, 3)
 
 
 def test_the_order_of_the_others_means_nothing() -> None:
@@ -97,7 +97,7 @@ def test_no_situation_at_all_is_answered() -> None:
 def lane(mate: tuple[float, float], *opponents: tuple[float, float]) -> list[float]:
     """Of the kick from (10, 5) to a team mate: radians, cycles, metres to the nearest opponent, metres."""
     columns = crowd().columns(placed((10, 5), [mate], list(opponents)))
-    assert columns.shape == (1, OTHERS + 1, COLUMNS)
+    assert columns.shape == (1, OTHERS + 1, PLAYER_COLUMNS)
     angle, ahead, nearest, distance = columns[0, 0, -4:].tolist()
     return [angle, 10 * ahead, 10 * nearest, 20 * distance]
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.models.inputs.geometry import GEOMETRY, geometry_of
-from teamclone.models.layers.targets import COLUMNS, Aims, layers
+from teamclone.models.layers.targets import TARGET_COLUMNS, TargetPoints, layers
 
 SCALE = (0.75 * 52.5, 0.75 * 34.0)
 
@@ -19,19 +19,19 @@ def geometry(batch: int = 1, **values: float) -> Tensor:
     return torch.tensor(row).expand(batch, -1)
 
 
-def at(*places: tuple[float, float]) -> Aims:
-    """Aims that suppose these places whatever they are given."""
-    aims = Aims(3, len(places), (), nn.ReLU)
+def at(*places: tuple[float, float]) -> TargetPoints:
+    """TargetPoints that suppose these places whatever they are given."""
+    aims = TargetPoints(3, len(places), (), nn.ReLU)
     with torch.no_grad():
         aims.place.weight.zero_()
         aims.place.bias.copy_((torch.tensor(places) / torch.tensor(SCALE)).flatten())
     return aims
 
 
-def look(aims: Aims, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def look(aims: TargetPoints, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     with torch.no_grad():
         columns, bearing, power = aims(torch.randn(len(seen), 3), seen)
-    return columns.view(len(seen), aims.count, COLUMNS), bearing, power
+    return columns.view(len(seen), aims.count, TARGET_COLUMNS), bearing, power
 
 
 def test_layers() -> None:
@@ -109,12 +109,12 @@ def test_a_place_where_he_stands_is_a_number() -> None:
 
 def test_places_follow_from_what_is_seen_and_are_learned() -> None:
     torch.manual_seed(0)
-    aims = Aims(3, 2, (16,), nn.ReLU)
+    aims = TargetPoints(3, 2, (16,), nn.ReLU)
     rows = torch.randn(64, 3)
     wanted = torch.stack([10 * rows[:, 0], 10 * rows[:, 1]], 1)
     optimiser = torch.optim.Adam(aims.parameters(), lr=0.02)
     for _ in range(100):
-        columns = aims(rows, geometry(64, line_x=100.0))[0].view(64, 2, COLUMNS)
+        columns = aims(rows, geometry(64, line_x=100.0))[0].view(64, 2, TARGET_COLUMNS)
         loss = (20 * columns[:, 0, :2] - wanted).square().mean()
         optimiser.zero_grad()
         loss.backward()
@@ -123,7 +123,7 @@ def test_places_follow_from_what_is_seen_and_are_learned() -> None:
 
 
 def test_no_places() -> None:
-    aims = Aims(3, 0, (), nn.ReLU)
+    aims = TargetPoints(3, 0, (), nn.ReLU)
     outputs = aims(torch.randn(5, 3), geometry(5))
     assert [tuple(output.shape) for output in outputs] == [(5, 0)] * 3
     assert list(aims.parameters()) == []

@@ -30,7 +30,7 @@ from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation import metrics
-from teamclone.evaluation.evaluate import predict
+from teamclone.evaluation.predict import predict
 from teamclone.models.clone import Clone
 from teamclone.store import Store, create_store, open_store
 from teamclone.store.ingest import ingest

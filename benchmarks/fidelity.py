@@ -24,7 +24,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -42,8 +42,10 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation import baselines, metrics
-from teamclone.evaluation.evaluate import count_training, describe, predict, truth
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.describe import describe
+from teamclone.evaluation.evaluate import count_training
+from teamclone.evaluation.predict import predict, truth
+from teamclone.evaluation.predictions import Predictions
 from teamclone.models.clone import parameter_count
 from teamclone.models.config import BLOCKS
 from teamclone.models.inputs.egocentric import EgocentricFeatures
@@ -302,7 +304,7 @@ class Work:
         place = {name: index for index, name in enumerate(everything.names)}
         return made[:, [place[name] for name in features.names]]
 
-    def figures(self, outcome: Outcome) -> dict[str, Any]:
+    def figures(self, outcome: Predictions) -> dict[str, Any]:
         """Of all sets: ``all`` field players, and ``2-11`` of them by number."""
         numbered = self.dataset.samples["player"].numpy()[self.rows] >= 1
         return {
@@ -313,7 +315,7 @@ class Work:
             for name, mask in self.sets.items()
         }
 
-    def _section(self, outcome: Outcome) -> dict[str, Any]:
+    def _section(self, outcome: Predictions) -> dict[str, Any]:
         section = describe(outcome, baselines=self.counted, matches=self.dataset.matches)
         kept = {key: section[key] for key in ("rows", "model", "commands", "parameters", "confusion")}
         return {**kept, "matches": len(section["matches"])}
@@ -436,11 +438,11 @@ class Work:
         text = " ".join(command).replace(f"{sys.executable} -m teamclone", "teamclone")
         return text.replace(str(self.options.matches), "MATCHES").replace(str(self.out), "DIR")
 
-    def bare(self) -> Outcome:
+    def bare(self) -> Predictions:
         """What happened in ``rows``, with even probabilities as answers."""
         kind, issued, last = truth(self.dataset, self.rows)
         n = len(self.rows)
-        return Outcome(
+        return Predictions(
             probabilities=np.full((n, len(CLONED)), 1 / len(CLONED), np.float32),
             parameters=np.zeros((n, len(PARAMETERS)), np.float32),
             parameter_log_loss=np.full(n, np.nan, np.float32),
@@ -482,7 +484,7 @@ class Work:
         probabilities = np.zeros_like(bare.probabilities)
         inputs = self.inputs_of(features)[:, : features.n_inputs].numpy()
         probabilities[:, classifier.classes_] = classifier.predict_proba(inputs)
-        outcome = Outcome(**{**{name: getattr(bare, name) for name in bare.__slots__}, "probabilities": probabilities})
+        outcome = replace(bare, probabilities=probabilities)
         return {
             "seconds": seconds,
             "rows": len(trained),
@@ -517,7 +519,7 @@ class Work:
         if len(answers) > 1:
             bare, stacked = self.bare(), np.stack(answers)
             where = np.concatenate([situations(self.dataset.state(part)) for part in chunks(self.rows)])
-            together = Outcome(
+            together = Predictions(
                 **{**{name: getattr(bare, name) for name in bare.__slots__}, "probabilities": stacked.mean(0)}
             )
             found["seeds"] = len(answers)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from teamclone.dataset.reader import Dataset, open_dataset
     from teamclone.errors import TeamcloneError
     from teamclone.evaluation.evaluate import evaluate
-    from teamclone.evaluation.prediction import PredictionTable
+    from teamclone.evaluation.prediction_table import PredictionTable
     from teamclone.evaluation.report import make_report
     from teamclone.logs import Match, find_matches, read_match
     from teamclone.store.ingest import ingest
@@ -47,7 +47,7 @@ _HOME = {
     "Run": "training.run",
     "load": "api",
     "LoadedClone": "api",
-    "PredictionTable": "evaluation.prediction",
+    "PredictionTable": "evaluation.prediction_table",
     "evaluate": "evaluation.evaluate",
     "make_report": "evaluation.report",
     "TeamcloneError": "errors",

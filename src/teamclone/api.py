@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from teamclone.errors import StoreError, UsageError
-from teamclone.evaluation.prediction import MatchColumns, PredictionTable, predict_match
+from teamclone.evaluation.prediction_table import MatchColumns, PredictionTable, predict_match
 from teamclone.logs import Match, read_match
 from teamclone.rcss.player_types import FIELDS
 from teamclone.training.run import Run, open_run

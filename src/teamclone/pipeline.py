@@ -13,7 +13,7 @@ from pathlib import Path
 from teamclone.dataset.build import DatasetConfig, build_dataset, is_current
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import PlayError, UsageError
-from teamclone.evaluation.evaluate import evaluate, save_evaluation
+from teamclone.evaluation.evaluate import evaluate_and_save
 from teamclone.evaluation.report import fresh_evaluation, make_report
 from teamclone.play.record import Record
 from teamclone.play.runner import PlayReport, play
@@ -247,7 +247,7 @@ def _evaluate(run: Run, checkpoint: str, watch: Watch) -> bool:
     evaluation = fresh_evaluation(run)
     if evaluation is not None and evaluation["run"]["checkpoint"] == checkpoint:
         return False
-    save_evaluation(run, evaluate(run, checkpoint=checkpoint, on_progress=watch.steps(Stage.EVALUATE)))
+    evaluate_and_save(run, checkpoint=checkpoint, on_progress=watch.steps(Stage.EVALUATE))
     return True
 
 

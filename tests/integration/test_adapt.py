@@ -22,7 +22,8 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.evaluation import metrics
-from teamclone.evaluation.evaluate import evaluate, predict
+from teamclone.evaluation.evaluate import evaluate
+from teamclone.evaluation.predict import predict
 from teamclone.evaluation.report import commands
 from teamclone.models.clone import model_id
 from teamclone.training.adapt import SETTINGS, adaptation

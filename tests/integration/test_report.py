@@ -21,7 +21,8 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import DatasetError, RunError
 from teamclone.evaluation import latency, metrics
-from teamclone.evaluation.evaluate import evaluate, load_evaluation, predict
+from teamclone.evaluation.evaluate import evaluate, load_evaluation
+from teamclone.evaluation.predict import predict
 from teamclone.evaluation.report import make_report, number, percent
 from teamclone.models.clone import model_id
 from teamclone.rcss.commands import CLONED_KINDS

@@ -18,22 +18,19 @@ def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
     """Time single answers of a clone on one thread, and answers for 22 players at once."""
-    from teamclone.dataset.reader import open_dataset
-    from teamclone.evaluation.latency import measure_latency
-    from teamclone.system.files import write_json
+    from teamclone.evaluation.latency import measure_run
     from teamclone.training.run import open_run
 
     opened = open_run(run)
     with progress("bench") as bar:
         task = bar.add_task("", total=n)
-        result = measure_latency(
-            opened.load_model(checkpoint),
-            open_dataset(data or opened.dataset_path),
+        result, path = measure_run(
+            opened,
+            dataset=data,
+            checkpoint=checkpoint,
             n=n,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    path = opened.path / "bench.json"
-    write_json(path, result)
     if as_json:
         print_json(result)
         return

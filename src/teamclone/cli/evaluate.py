@@ -20,21 +20,19 @@ def evaluate(
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
     """Say how good a clone is: on test matches, against unseen opponents, and beside rules without a network."""
-    from teamclone.evaluation.evaluate import evaluate as run_evaluation
-    from teamclone.evaluation.evaluate import save_evaluation
+    from teamclone.evaluation.evaluate import evaluate_and_save
     from teamclone.training.run import open_run
 
     opened = open_run(run)
     with progress("evaluate") as bar:
         task = bar.add_task("", total=None)
-        result = run_evaluation(
+        result, path = evaluate_and_save(
             opened,
             dataset=data,
             checkpoint=checkpoint,
             seed=seed,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    path = save_evaluation(opened, result)
     if as_json:
         print_json(result)
         return
@@ -43,16 +41,24 @@ def evaluate(
 
 
 def print_summary(evaluation: dict[str, Any]) -> None:
-    """The figures of an evaluation that fit on a screen."""
-    from teamclone.evaluation.bootstrap import FEW_MATCHES
-    from teamclone.evaluation.metrics import even_log_loss
-
+    """Print the figures of an evaluation that fit on a screen."""
     splits = evaluation["splits"]
     print(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
     seen = evaluation["dataset"]["trained_on_before"]
     if seen:
         print(f"Caution: {len(seen)} of these matches were in training.")
     print()
+    _print_splits(splits)
+    for name in [name for name in ("test", "unseen") if name in splits] or list(splits):
+        _print_commands(name, splits[name])
+        _print_parameters(name, splits[name])
+    print()
+
+
+def _print_splits(splits: dict[str, Any]) -> None:
+    """Print the figures of every split beside those of the baselines, and what limits them."""
+    from teamclone.evaluation.bootstrap import FEW_MATCHES
+
     figures = (("accuracy", "accuracy", 3), ("cross_entropy", "CE, nats", 3), ("ece", "ECE", 3), ("brier", "Brier", 3))
     rows = []
     for name, split in splits.items():
@@ -68,66 +74,73 @@ def print_summary(evaluation: dict[str, Any]) -> None:
     if any(1 < len(split["matches"]) < FEW_MATCHES for split in splits.values()):
         print(f"Intervals from fewer than {FEW_MATCHES} matches are too narrow: take them as the spread seen so far.")
     for name, split in splits.items():
-        for number, row in split["strangers"].items():
+        for number, row in split["unseen_numbers"].items():
             print(
                 f"{name}: number {number} gives {row['rows']:,} commands (accuracy {row['accuracy']:.3f}) and none in "
                 "training: inputs that know players by their number do not know this one."
             )
-    for name in [name for name in ("test", "unseen") if name in splits] or list(splits):
-        split = splits[name]
-        print()
-        print_table(
-            [name, "given", "predicted", "precision", "recall", "specificity", "F1"],
-            [
-                (
-                    command,
-                    f"{row['support']:,}",
-                    f"{row['predicted']:,}",
-                    *(_cell(row[key], 3) for key in ("precision", "recall", "specificity", "f1")),
-                )
-                for command, row in split["commands"].items()
-            ],
-            numeric=range(1, 7),
-        )
-        if "situations" in split:
-            print()
-            print_table(
-                [name, "rows", "accuracy", "CE, nats"],
-                [
-                    (situation, f"{row['rows']:,}", _number(row["accuracy"], 3), _number(row["cross_entropy"], 3))
-                    for situation, row in split["situations"].items()
-                ],
-                numeric=range(1, 4),
-            )
-        print()
-        print_table(
-            [name, "unit", "commands", "mean error", "median error", "constant guess, mean error"],
-            [
-                (
-                    parameter.replace("_", " "),
-                    row["unit"],
-                    f"{row['rows']:,}",
-                    _cell(row["mean"], 1),
-                    _number(row["median"], 1),
-                    _number(row["constant"]["mean"], 1),
-                )
-                for parameter, row in split["parameters"].items()
-            ],
-            numeric=range(2, 6),
-        )
-        losses = {command: row["parameter_log_loss"] for command, row in split["commands"].items()}
-        if any(loss["value"] is not None for loss in losses.values()):
-            print()
-            print_table(
-                [name, "log loss of its parameters, nats", "even guess"],
-                [
-                    (command, _cell(losses[command], 2), _number(even, 2))
-                    for command, even in even_log_loss(list(losses)).items()
-                    if command != "none"
-                ],
-                numeric=(1, 2),
-            )
+
+
+def _print_commands(name: str, split: dict[str, Any]) -> None:
+    """Print the rates of each command in a split, and the figures by situation where there are several."""
     print()
+    print_table(
+        [name, "given", "predicted", "precision", "recall", "specificity", "F1"],
+        [
+            (
+                command,
+                f"{row['support']:,}",
+                f"{row['predicted']:,}",
+                *(_cell(row[key], 3) for key in ("precision", "recall", "specificity", "f1")),
+            )
+            for command, row in split["commands"].items()
+        ],
+        numeric=range(1, 7),
+    )
+    if "situations" in split:
+        print()
+        print_table(
+            [name, "rows", "accuracy", "CE, nats"],
+            [
+                (situation, f"{row['rows']:,}", _number(row["accuracy"], 3), _number(row["cross_entropy"], 3))
+                for situation, row in split["situations"].items()
+            ],
+            numeric=range(1, 4),
+        )
+
+
+def _print_parameters(name: str, split: dict[str, Any]) -> None:
+    """Print the errors of each parameter in a split, and the log loss where the head has a density."""
+    from teamclone.evaluation.metrics import even_log_loss
+
+    print()
+    print_table(
+        [name, "unit", "commands", "mean error", "median error", "constant guess, mean error"],
+        [
+            (
+                parameter.replace("_", " "),
+                row["unit"],
+                f"{row['rows']:,}",
+                _cell(row["mean"], 1),
+                _number(row["median"], 1),
+                _number(row["constant"]["mean"], 1),
+            )
+            for parameter, row in split["parameters"].items()
+        ],
+        numeric=range(2, 6),
+    )
+    losses = {command: row["parameter_log_loss"] for command, row in split["commands"].items()}
+    if any(loss["value"] is not None for loss in losses.values()):
+        print()
+        print_table(
+            [name, "log loss of its parameters, nats", "even guess"],
+            [
+                (command, _cell(losses[command], 2), _number(even, 2))
+                for command, even in even_log_loss(list(losses)).items()
+                if command != "none"
+            ],
+            numeric=(1, 2),
+        )
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.evaluation.metrics import Counts, Floats
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.predictions import Predictions
 from teamclone.rcss.commands import CLONED, parameters_of
 
 SMOOTHING = 1.0
@@ -70,7 +70,7 @@ class Baselines:
             return smoothed
         raise ValueError(f"unknown baseline {name!r}, expected one of {', '.join(NAMES)}")
 
-    def answer(self, name: str, outcome: Outcome) -> Outcome:
+    def answer(self, name: str, outcome: Predictions) -> Predictions:
         """The same rows with a baseline's answers in place of the model's."""
         probabilities = self.table(name)[outcome.last].astype(np.float32)  # -1, none known, is the last row
         parameters = np.broadcast_to(self.parameters.astype(np.float32), outcome.parameters.shape)

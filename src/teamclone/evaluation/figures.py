@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from teamclone.plots.pitch import draw_pitch
+from teamclone.plots.style import Colours, style
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 
 KINDS = CLONED
@@ -33,33 +34,7 @@ PERCENT = "\N{NARROW NO-BREAK SPACE}%"
 WIDTH = 7.4
 """Inches; the page scales it to its column."""
 
-_STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "teamclone",
-    "font.size": 9.0,
-    "axes.titlesize": 9.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": MUTED,
-    "axes.titlecolor": INK,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": RULE,
-    "grid.linewidth": 0.7,
-    "text.color": INK,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "lines.linewidth": 1.6,
-    "lines.solid_capstyle": "round",
-}
+_STYLE = style(Colours(ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND))
 
 
 def svg(figure: Figure, *, name: str, alt: str) -> str:
@@ -275,14 +250,19 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
         axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=PERCENT))
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=PERCENT))
     top = calibration["predicted_command"]
-    left.plot(top["said"], top["came_true"], color=ACCENT, marker="o", markersize=4)
+    left.plot(top["confidence"], top["observed_frequency"], color=ACCENT, marker="o", markersize=4)
     left.set_title("the predicted command")
     left.set_xlabel("probability said")
     left.set_ylabel("share that came true")
     for kind, curve in calibration["commands"].items():
         if sum(curve["rows"]):
             right.plot(
-                curve["said"], curve["came_true"], color=KIND_COLOURS[kind], marker="o", markersize=3, label=kind
+                curve["confidence"],
+                curve["observed_frequency"],
+                color=KIND_COLOURS[kind],
+                marker="o",
+                markersize=3,
+                label=kind,
             )
     right.set_title("each command")
     right.set_xlabel("probability said")

@@ -13,16 +13,18 @@ import numpy as np
 import torch
 
 from teamclone import __version__
-from teamclone.dataset.reader import Dataset
+from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError
-from teamclone.evaluation.evaluate import read_document
+from teamclone.evaluation.documents import read_document
 from teamclone.models.clone import model_id
 from teamclone.rcss.players import N_PLAYERS
+from teamclone.system.files import write_json
 from teamclone.system.machine import processor
 from teamclone.world.state import State
 
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
+    from teamclone.training.run import Run
 
 FORMAT = 1
 """Of bench.json."""
@@ -30,6 +32,37 @@ N_PREDICTIONS = 20_000
 WARM_UP = 200
 N_STATES = 512
 """Different situations that the predictions take in turn."""
+
+
+def measure_run(
+    run: Run,
+    *,
+    dataset: Dataset | Path | str | None = None,
+    checkpoint: str = "best-loss",
+    n: int = N_PREDICTIONS,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> tuple[dict[str, Any], Path]:
+    """Time the predictions of a run as `measure_latency` does and write RUN/bench.json.
+
+    Args:
+        run: the run.
+        dataset: where the situations are from; None for the dataset that the run was trained on.
+        checkpoint: which weights.
+        n: number of single predictions.
+        on_progress: called with predictions done and predictions in all.
+
+    Returns:
+        The times and their file.
+
+    Raises:
+        DatasetError: the dataset is missing, has no samples, or a match lacks what the model needs.
+        RunError: there is no such checkpoint.
+    """
+    data = dataset if isinstance(dataset, Dataset) else open_dataset(dataset or run.dataset_path)
+    bench = measure_latency(run.load_model(checkpoint), data, n=n, on_progress=on_progress)
+    path = run.path / "bench.json"
+    write_json(path, bench)
+    return bench, path
 
 
 def measure_latency(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.predictions import Predictions
 from teamclone.rcss.commands import CLONED, parameters_of
 from teamclone.rcss.reference_frame import wrap_degrees
 
@@ -25,7 +25,7 @@ CALIBRATION_BINS = 15
 
 
 def even_log_loss(commands: Sequence[str]) -> dict[str, float]:
-    """What an even guess over the whole range of a command's parameters has as `Outcome.parameter_log_loss`."""
+    """What an even guess over the whole range of a command's parameters has as `Predictions.parameter_log_loss`."""
     return {
         name: sum(
             math.log(item.limit if item.unit == "power" else 2 * item.limit)
@@ -135,7 +135,7 @@ def confidence_edges(probabilities: NDArray[np.floating], bins: int = CALIBRATIO
     return np.unique(np.quantile(probabilities.max(axis=1).astype(np.float64), np.arange(1, bins) / bins))
 
 
-def measure(outcome: Outcome, *, edges: Floats | None = None) -> tuple[Counts, Sums]:
+def measure(outcome: Predictions, *, edges: Floats | None = None) -> tuple[Counts, Sums]:
     """The matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
 
     Args:
@@ -285,22 +285,24 @@ class Curve(NamedTuple):
     """A reliability curve, (bins,) each: rows, mean probability said, share that came true."""
 
     rows: Floats
-    said: Floats
-    came_true: Floats
+    confidence: Floats
+    observed_frequency: Floats
 
 
 def top_label_curve(sums: Sums) -> Curve:
     """How often the predicted command was right, by the confidence in it; bins without rows are left out."""
     filled = sums.bin_count > 0
     count = sums.bin_count[filled]
-    return Curve(rows=count, said=sums.bin_confidence[filled] / count, came_true=sums.bin_hits[filled] / count)
+    return Curve(
+        rows=count, confidence=sums.bin_confidence[filled] / count, observed_frequency=sums.bin_hits[filled] / count
+    )
 
 
-def command_curve(outcome: Outcome, kind: int, bins: int = CALIBRATION_BINS) -> Curve:
+def command_curve(outcome: Predictions, kind: int, bins: int = CALIBRATION_BINS) -> Curve:
     """How often a command was given, by the probability said for it, over all rows in bins of equal mass."""
     said = outcome.probabilities[:, kind].astype(np.float64)
     if len(said) == 0:
-        return Curve(rows=np.zeros(0), said=np.zeros(0), came_true=np.zeros(0))
+        return Curve(rows=np.zeros(0), confidence=np.zeros(0), observed_frequency=np.zeros(0))
     edges = np.unique(np.quantile(said, np.arange(1, bins) / bins))
     place = np.searchsorted(edges, said, side="right")
     count = np.bincount(place, minlength=len(edges) + 1).astype(np.float64)
@@ -309,8 +311,8 @@ def command_curve(outcome: Outcome, kind: int, bins: int = CALIBRATION_BINS) -> 
     total_true = np.bincount(place, weights=(outcome.kind == kind).astype(np.float64), minlength=len(count))
     return Curve(
         rows=count[filled],
-        said=(total_said / np.maximum(count, 1))[filled],
-        came_true=ratio(total_true, count)[filled],
+        confidence=(total_said / np.maximum(count, 1))[filled],
+        observed_frequency=ratio(total_true, count)[filled],
     )
 
 

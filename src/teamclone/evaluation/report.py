@@ -11,13 +11,12 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from teamclone.dataset.reader import open_dataset
 from teamclone.errors import RunError
 from teamclone.evaluation import bootstrap, figures, metrics, paper
-from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evaluation
-from teamclone.evaluation.latency import load_bench, measure_latency
+from teamclone.evaluation.evaluate import evaluate_and_save, load_evaluation
+from teamclone.evaluation.latency import load_bench, measure_run
 from teamclone.models.clone import model_id
-from teamclone.system.files import write_atomic, write_json
+from teamclone.system.files import write_atomic
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
 
@@ -173,12 +172,13 @@ def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
 def calibration_sentence(section: Mapping[str, Any]) -> str:
     """What the confidence means, at the most confident bin and at the least."""
     curve = section["calibration"]["predicted_command"]
-    if not curve["said"]:
+    if not curve["confidence"]:
         return ""
-    low, high = 0, len(curve["said"]) - 1
+    confidence, observed = curve["confidence"], curve["observed_frequency"]
+    low, high = 0, len(confidence) - 1
     return (
-        f"When it is {percent(curve['said'][high], 0)} sure it is right {percent(curve['came_true'][high], 0)} of the "
-        f"time, and {percent(curve['came_true'][low], 0)} when it is {percent(curve['said'][low], 0)} sure."
+        f"When it is {percent(confidence[high], 0)} sure it is right {percent(observed[high], 0)} of the "
+        f"time, and {percent(observed[low], 0)} when it is {percent(confidence[low], 0)} sure."
     )
 
 
@@ -244,14 +244,18 @@ def make_report(
     def telling(work: str) -> Callable[[int, int], None] | None:
         return None if on_progress is None else lambda done, total: on_progress(work, done, total)
 
-    evaluation = fresh_evaluation(run) or evaluate(run, on_progress=telling("evaluate"))
-    save_evaluation(run, evaluation)
+    evaluation = fresh_evaluation(run)
+    if evaluation is None:
+        evaluation, _ = evaluate_and_save(run, on_progress=telling("evaluate"))
     bench = fresh_bench(run, checkpoint=evaluation["run"]["checkpoint"])
     if bench is None and quick_predictions:
-        dataset = open_dataset(evaluation["dataset"]["path"])
-        model = run.load_model(evaluation["run"]["checkpoint"])
-        bench = measure_latency(model, dataset, n=quick_predictions, on_progress=telling("response times"))
-        write_json(run.path / "bench.json", bench)
+        bench, _ = measure_run(
+            run,
+            dataset=evaluation["dataset"]["path"],
+            checkpoint=evaluation["run"]["checkpoint"],
+            n=quick_predictions,
+            on_progress=telling("response times"),
+        )
     html = render(run, evaluation, bench, history=run.history())
     path = out or run.path / "report.html"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,35 +13,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
+from teamclone.plots.style import LIGHT, style
 from teamclone.search.search import OPTIMISERS, RATES, Beam, Mode, Search, Status, Trial
 from teamclone.system.files import write_atomic
 
-INK, MUTED, FAINT, RULE, ACCENT, SECOND = "#1c2126", "#5d6872", "#b9c3cd", "#e2e7ec", "#1b6fb3", "#c46a12"
+INK, MUTED, FAINT, ACCENT, SECOND = LIGHT.ink, LIGHT.muted, "#b9c3cd", LIGHT.accent, LIGHT.second
 OPTIMISER_COLOURS = dict(zip(OPTIMISERS, (ACCENT, SECOND, "#1f9e78"), strict=True))
 RATE_LINES: dict[float, Any] = dict(zip(RATES, ((0, (1, 1.2)), "-", (0, (5, 2))), strict=True))
 
-_STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "teamclone",
-    "font.size": 9.0,
-    "axes.titlesize": 9.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": MUTED,
-    "axes.titlecolor": INK,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": RULE,
-    "text.color": INK,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "lines.linewidth": 1.6,
-}
+_STYLE = style(LIGHT)
 
 
 @mpl.rc_context(_STYLE)

@@ -15,7 +15,7 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
-from teamclone.evaluation.evaluate import predict
+from teamclone.evaluation.predict import predict
 from teamclone.models.clone import Clone
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.rcss.player_types import DEFAULTS

@@ -7,7 +7,7 @@ import pytest
 
 from teamclone.evaluation import metrics
 from teamclone.evaluation.baselines import NAMES, Baselines, Counter
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.predictions import Predictions
 from teamclone.rcss.commands import CLONED
 
 # Last command by command given; the last row is "none known". 100 rows: 61 dash, 35 turn, 4 kick.
@@ -19,9 +19,9 @@ def baselines() -> Baselines:
     return Baselines(transitions=TRANSITIONS, parameters=np.array([80.0, 0.0, 10.0, 100.0, -5.0, np.nan]))
 
 
-def outcome(kind, last) -> Outcome:
+def outcome(kind, last) -> Predictions:
     n = len(kind)
-    return Outcome(
+    return Predictions(
         probabilities=np.full((n, 4), 0.25, np.float32),
         parameters=np.zeros((n, 6), np.float32),
         parameter_log_loss=np.full(n, -1.5, np.float32),

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from teamclone.evaluation import bootstrap, metrics
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.predictions import Predictions
 
 
-def made(seed: int, *, n: int = 400, n_matches: int = 3) -> Outcome:
+def made(seed: int, *, n: int = 400, n_matches: int = 3) -> Predictions:
     generator = np.random.default_rng(seed)
     issued = np.full((n, 6), np.nan, np.float32)
     kind = generator.integers(0, 4, n)
     issued[kind == 1, 2] = generator.uniform(-180, 180, int((kind == 1).sum()))
-    return Outcome(
+    return Predictions(
         probabilities=generator.dirichlet(np.ones(4), n).astype(np.float32),
         parameters=generator.uniform(-100, 100, (n, 6)).astype(np.float32),
         parameter_log_loss=generator.normal(3, 1, n).astype(np.float32),

@@ -10,8 +10,8 @@ import pytest
 
 from teamclone.evaluation import metrics
 from teamclone.evaluation.baselines import Baselines
-from teamclone.evaluation.evaluate import describe, strangers
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.describe import describe, unseen_numbers
+from teamclone.evaluation.predictions import Predictions
 from teamclone.evaluation.report import listing, number, percent, points, sentences
 from teamclone.system.files import write_json
 
@@ -19,12 +19,12 @@ MATCHES = [{"match_id": f"m{index}", "opponent": "Red" if index < 2 else "Blue"}
 BASELINES = Baselines(transitions=np.full((5, 4), 9), parameters=np.full(6, 5.0))
 
 
-def outcome(n: int = 600, n_matches: int = 3) -> Outcome:
+def outcome(n: int = 600, n_matches: int = 3) -> Predictions:
     generator = np.random.default_rng(8)
     kind = generator.choice(3, n, p=[0.6, 0.35, 0.05])  # no tackle occurs
     issued = np.full((n, 6), np.nan, np.float32)
     issued[kind == 0, 0] = 60
-    return Outcome(
+    return Predictions(
         probabilities=(0.2 * generator.dirichlet(np.ones(4), n) + 0.8 * np.eye(4)[kind]).astype(np.float32)[
             generator.permutation(n)
         ],
@@ -117,7 +117,7 @@ def test_the_same_seed_gives_the_same_document(tmp_path) -> None:
     assert json.loads((tmp_path / "a.json").read_text()) == documents[0]
 
 
-def document(**splits: Outcome) -> dict:
+def document(**splits: Predictions) -> dict:
     sections = {name: describe(made, baselines=BASELINES, matches=MATCHES) for name, made in splits.items()}
     return {"splits": sections, "dataset": {"team": "HELIOS_base", "options": {"split": "match"}}}
 
@@ -170,7 +170,7 @@ def test_numbers_that_never_played_in_training_are_named():
     """Player 0 (number 1) is in the split and not in training; 3 of his 4 commands are predicted right."""
     kind = np.array([0, 0, 1, 1, 0], np.int64)
     probabilities = np.eye(4, dtype=np.float32)[[0, 0, 1, 0, 0]]
-    outcome = Outcome(
+    outcome = Predictions(
         probabilities=probabilities,
         parameters=np.zeros((5, 6), np.float32),
         parameter_log_loss=np.zeros(5, np.float32),
@@ -182,5 +182,5 @@ def test_numbers_that_never_played_in_training_are_named():
     )
     players = np.array([0, 0, 0, 0, 7], np.uint8)
     trained = np.array([5, 7, 7], np.uint8)
-    assert strangers(outcome, players=players, trained=trained) == {"1": {"rows": 4, "accuracy": 0.75}}
-    assert strangers(outcome, players=players, trained=players) == {}
+    assert unseen_numbers(outcome, players=players, trained=trained) == {"1": {"rows": 4, "accuracy": 0.75}}
+    assert unseen_numbers(outcome, players=players, trained=players) == {}

@@ -78,8 +78,8 @@ def drawn() -> dict[str, Figure]:
     value = {"value": 0.8, "low": 0.75, "high": 0.83}
     alone = {"value": 0.7, "low": None, "high": None}
     model = dict.fromkeys(("accuracy", "cross_entropy", "ece", "paper_mae"), value)
-    curve = {"rows": [10, 10], "said": [0.3, 0.9], "came_true": [0.4, 0.8]}
-    nothing = {"rows": [], "said": [], "came_true": []}
+    curve = {"rows": [10, 10], "confidence": [0.3, 0.9], "observed_frequency": [0.4, 0.8]}
+    nothing = {"rows": [], "confidence": [], "observed_frequency": []}
     history = [
         {"epoch": epoch, "train_accuracy": 0.5 + epoch / 10, "validation_accuracy": 0.5, "train_cross_entropy": 1.0}
         for epoch in (1, 2, 3)

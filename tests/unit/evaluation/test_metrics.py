@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from teamclone.evaluation import metrics, paper
-from teamclone.evaluation.outcome import Outcome
+from teamclone.evaluation.predictions import Predictions
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 
 DASH, TURN, KICK, TACKLE = range(4)
@@ -17,9 +17,9 @@ DASH, TURN, KICK, TACKLE = range(4)
 HAND = np.array([[60, 8, 2, 0], [9, 15, 0, 0], [1, 0, 4, 0], [0, 1, 0, 0]])
 
 
-def outcome(probabilities, kind, *, parameters=None, losses=None, issued=None, last=None, match=None) -> Outcome:
+def outcome(probabilities, kind, *, parameters=None, losses=None, issued=None, last=None, match=None) -> Predictions:
     n = len(kind)
-    return Outcome(
+    return Predictions(
         probabilities=np.asarray(probabilities, np.float32).reshape(n, 4),
         parameters=np.zeros((n, 6), np.float32) if parameters is None else np.asarray(parameters, np.float32),
         parameter_log_loss=np.full(n, np.nan, np.float32) if losses is None else np.asarray(losses, np.float32),
@@ -31,7 +31,7 @@ def outcome(probabilities, kind, *, parameters=None, losses=None, issued=None, l
     )
 
 
-def of_confusion(confusion) -> Outcome:
+def of_confusion(confusion) -> Predictions:
     """Rows that give this confusion matrix, with certain predictions."""
     kind, predicted = (np.repeat(index.reshape(-1), confusion.reshape(-1)) for index in np.indices((4, 4)))
     return outcome(np.eye(4)[predicted], kind)
@@ -113,8 +113,8 @@ def test_expected_calibration_error() -> None:
     assert metrics.scores(sums).ece == pytest.approx(0.8 / 6, rel=1e-6)
     curve = metrics.top_label_curve(sums)
     np.testing.assert_array_equal(curve.rows, [2, 4])
-    np.testing.assert_allclose(curve.said, [0.6, 0.9], rtol=1e-6)
-    np.testing.assert_allclose(curve.came_true, [0.5, 0.75])
+    np.testing.assert_allclose(curve.confidence, [0.6, 0.9], rtol=1e-6)
+    np.testing.assert_allclose(curve.observed_frequency, [0.5, 0.75])
 
 
 def test_bins_hold_equal_mass_and_never_part_equal_confidences() -> None:
@@ -133,8 +133,8 @@ def test_command_curve_looks_at_one_command_over_all_rows() -> None:
         [[0.2, 0.8, 0, 0]] * 5 + [[0.6, 0.4, 0, 0]] * 5, [DASH, TURN, TURN, TURN, TURN] + [DASH] * 3 + [TURN] * 2
     )
     curve = metrics.command_curve(made, DASH, bins=2)
-    np.testing.assert_allclose(curve.said, [0.2, 0.6], rtol=1e-6)
-    np.testing.assert_allclose(curve.came_true, [1 / 5, 3 / 5])
+    np.testing.assert_allclose(curve.confidence, [0.2, 0.6], rtol=1e-6)
+    np.testing.assert_allclose(curve.observed_frequency, [1 / 5, 3 / 5])
 
 
 def test_directions_are_compared_around_the_circle() -> None:
@@ -203,7 +203,7 @@ def test_figures_of_further_commands() -> None:
     issued[0, 6:], issued[1, 2] = (-50, 30), -170
     predicted = np.zeros((3, 8), np.float32)
     predicted[0, 6:], predicted[1, 2] = (50, 26), 170
-    made = Outcome(
+    made = Predictions(
         probabilities=np.eye(6, dtype=np.float32)[[4, 0, 5]],
         parameters=predicted,
         parameter_log_loss=np.array([2.0, 3.0, np.nan], np.float32),

@@ -1,4 +1,4 @@
-"""``Outcome``: predictions beside what happened, as arrays. Everything in evaluation is computed from it."""
+"""``Predictions``: a model's answers beside what happened, as arrays. Everything in evaluation is computed from it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from teamclone.rcss.commands import CLONED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class Predictions:
     """One split of a dataset with a model's answers; n rows.
 
     Attributes:
@@ -43,7 +43,7 @@ class Outcome:
     def __len__(self) -> int:
         return len(self.kind)
 
-    def rows(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Outcome:
+    def rows(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Predictions:
         """The outcome of some rows only, by boolean mask or by number."""
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
         some: dict[str, Any] = {name: of[index] for name, of in columns.items() if isinstance(of, np.ndarray)}

@@ -20,7 +20,7 @@ def bench(
     """Time single answers of a clone on one thread, and answers for 22 players at once."""
     from teamclone.dataset.reader import open_dataset
     from teamclone.evaluation.latency import measure_latency
-    from teamclone.system.files import write_json
+    from teamclone.system.documents import write_document
     from teamclone.training.run import open_run
 
     opened = open_run(run)
@@ -33,7 +33,7 @@ def bench(
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     path = opened.path / "bench.json"
-    write_json(path, result)
+    write_document(path, result)
     if as_json:
         print_json(result)
         return

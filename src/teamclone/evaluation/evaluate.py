@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -26,7 +25,7 @@ from teamclone.models.clone import model_id, parameter_count
 from teamclone.models.heads.mixture import PointHead, with_ball
 from teamclone.rcss.commands import CLONED, parameters_of
 from teamclone.rcss.playmodes import RESTARTS, PlayMode
-from teamclone.system.files import write_json
+from teamclone.system.documents import read_document, write_document
 from teamclone.world.state import Target
 
 if TYPE_CHECKING:
@@ -547,28 +546,10 @@ def evaluation_path(run: Run, evaluation: dict[str, Any]) -> Path:
 def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
     """Write an evaluation into its run, whole or not at all; where it went."""
     path = evaluation_path(run, evaluation)
-    write_json(path, evaluation)
+    write_document(path, evaluation)
     return path
 
 
 def load_evaluation(path: Path | str) -> dict[str, Any]:
     """Read an evaluation back; raises as `read_document`."""
-    return read_document(Path(path), number=FORMAT, what="an evaluation", command="teamclone evaluate")
-
-
-def read_document(path: Path, *, number: int, what: str, command: str) -> dict[str, Any]:
-    """Read back what `write_json` wrote; ``what`` it is and which ``command`` makes it go into the errors.
-
-    Raises:
-        RunError: missing, damaged or of another format number.
-    """
-    try:
-        document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        found = document["format"]
-    except FileNotFoundError:
-        raise RunError(f"{path}: missing; make it with `{command}`") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path}: not {what} ({error!r}); make it again with `{command}`") from None
-    if found != number:
-        raise RunError(f"{path}: format {found}, this version reads {number}; run `{command}` again")
-    return document
+    return read_document(Path(path), what="an evaluation", number=FORMAT, command="teamclone evaluate", error=RunError)

@@ -14,10 +14,10 @@ import torch
 
 import teamclone
 from teamclone.dataset.reader import Dataset
-from teamclone.errors import DatasetError
-from teamclone.evaluation.evaluate import read_document
+from teamclone.errors import DatasetError, RunError
 from teamclone.models.clone import model_id
 from teamclone.rcss.players import N_PLAYERS
+from teamclone.system.documents import read_document
 from teamclone.system.machine import processor
 from teamclone.world.state import State
 
@@ -111,4 +111,4 @@ def _summary(times: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, f
 
 def load_bench(path: Path | str) -> dict[str, Any]:
     """Read bench.json back; raises as `read_document`."""
-    return read_document(Path(path), number=FORMAT, what="a benchmark", command="teamclone bench")
+    return read_document(Path(path), what="a benchmark", number=FORMAT, command="teamclone bench", error=RunError)

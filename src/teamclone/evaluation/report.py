@@ -17,7 +17,8 @@ from teamclone.evaluation import bootstrap, figures, metrics, paper
 from teamclone.evaluation.evaluate import evaluate, load_evaluation, save_evaluation
 from teamclone.evaluation.latency import load_bench, measure_latency
 from teamclone.models.clone import model_id
-from teamclone.system.files import write_atomic, write_json
+from teamclone.system.documents import write_document
+from teamclone.system.files import write_atomic
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
 
@@ -251,7 +252,7 @@ def make_report(
         dataset = open_dataset(evaluation["dataset"]["path"])
         model = run.load_model(evaluation["run"]["checkpoint"])
         bench = measure_latency(model, dataset, n=quick_predictions, on_progress=telling("response times"))
-        write_json(run.path / "bench.json", bench)
+        write_document(run.path / "bench.json", bench)
     html = render(run, evaluation, bench, history=run.history())
     path = out or run.path / "report.html"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -52,7 +52,7 @@ from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.reach import kickable_area, reach_ball
 from teamclone.planner.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
 from teamclone.rcss.commands import CLONED, PARAMETERS
-from teamclone.system.files import write_json
+from teamclone.system.documents import write_document
 from teamclone.system.machine import processor
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
@@ -362,7 +362,7 @@ class Work:
             "teamclone": teamclone.__version__,
         }
         head = {"format": FORMAT, "name": name, "settings": self.all_of(settings)}
-        write_json(path, {**head, **make(), "machine": machine})
+        write_document(path, {**head, **make(), "machine": machine})
 
     def all_of(self, settings: dict[str, Any]) -> dict[str, Any]:
         return {**settings, "dataset": self.dataset.id}
@@ -409,7 +409,7 @@ class Work:
                 cost = cost_of(*self.teamclone("train", data, "--out", folder, "--resume"))
             else:
                 cost = cost_of(*self.training(experiment))
-            write_json(ended, {"seconds": before + cost.wall, "peak_bytes": cost.peak})
+            write_document(ended, {"seconds": before + cost.wall, "peak_bytes": cost.peak})
         run = open_run(folder)
         model = run.load_model()
         inputs = self.inputs_of(model.features) if isinstance(model.features, EgocentricFeatures) else None
@@ -796,7 +796,7 @@ def main() -> None:
         if part in ("a", "tree"):
             work.result("tree", tree, lambda: work.tree(**tree))
         if part == "g":
-            write_json(work.out / "left.json", work.what_is_left(work.load()))
+            write_document(work.out / "left.json", work.what_is_left(work.load()))
     left = work.out / "left.json"
     page = options.page or work.out / "fidelity.md"
     results = work.load()

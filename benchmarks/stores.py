@@ -24,7 +24,7 @@ from teamclone.cli.common import print_table
 from teamclone.dataset import clean
 from teamclone.logs import Match, find_matches, read_pair
 from teamclone.store import Store, create_store
-from teamclone.store.postgres import Location
+from teamclone.store.postgres.location import Location
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
 from postgres import start_server

@@ -21,7 +21,8 @@ from fidelity import TEST_MATCHES
 from fidelity_page import filled, machines, table
 from measure import cost_of
 
-from teamclone.system.files import write_atomic, write_json
+from teamclone.system.documents import write_document
+from teamclone.system.files import write_atomic
 from teamclone.training.config import load_config
 from teamclone.training.run import open_run
 
@@ -68,7 +69,7 @@ class Work:
             shutil.rmtree(run, ignore_errors=True)
         seconds = self.teamclone("train", data, "--preset", "best", *settings, "--out", run, made=ended)
         if seconds is not None:
-            write_json(ended, {"seconds": seconds})
+            write_document(ended, {"seconds": seconds})
         self.teamclone("evaluate", run, made=run / "evaluation.json")
         figures = json.loads((run / "evaluation.json").read_text(encoding="utf-8"))["splits"]["test"]
         matches = json.loads((data / "dataset.json").read_text(encoding="utf-8"))["matches"]

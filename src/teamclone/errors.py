@@ -73,5 +73,7 @@ class RunError(TeamcloneError):
 def choose(wrong: str, choices: Iterable[str]) -> str:
     """The remedy for a name that is none: ``did you mean a or b?``, or all choices where none is near."""
     known = list(choices)
+    if not known:
+        return "there is none"
     near = difflib.get_close_matches(wrong, known, n=3)
     return f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(known)}"

@@ -22,7 +22,7 @@ from teamclone.errors import LogError, StoreError, UsageError
 from teamclone.logs import LogPair
 from teamclone.store import Store, create_store, ingest, open_store
 from teamclone.store import ingest as ingest_function
-from teamclone.store.status import Outcome
+from teamclone.store.status import FileOutcome
 from teamclone.system.workers import DIED
 
 COMMAND = Path(sys.executable).with_name("teamclone")
@@ -54,8 +54,8 @@ def test_a_second_run_does_nothing(logs: Path, store: Store) -> None:
     first = ingest([logs], store)
     assert (first.added, first.unchanged) == (1, 0)
     assert [(Path(row.path).name, row.outcome, row.rows) for row in first.files] == [
-        (f"{PLAIN}.rcg.gz", Outcome.OK, 199),
-        (f"{PLAIN}.rcl.gz", Outcome.OK, 30511),
+        (f"{PLAIN}.rcg.gz", FileOutcome.OK, 199),
+        (f"{PLAIN}.rcl.gz", FileOutcome.OK, 30511),
     ]
     before = tree(store)
     second = ingest([logs, logs / f"{PLAIN}.rcg.gz", logs / f"{PLAIN}.rcl.gz"], store)
@@ -98,10 +98,10 @@ def test_clocks_may_be_set(logs: Path, store: Store, seconds: int) -> None:
     whole, before = log.read_bytes(), log.stat().st_mtime_ns
     log.write_bytes(whole[: len(whole) // 2])
     os.utime(log, ns=(before, before))
-    assert ingest([logs], store).files[0].outcome is Outcome.PARTIAL
+    assert ingest([logs], store).files[0].outcome is FileOutcome.PARTIAL
     log.write_bytes(whole)
     os.utime(log, ns=(before, before + seconds * 10**9))
-    assert [status.outcome for status in ingest([logs], store).files] == [Outcome.OK] * 2
+    assert [status.outcome for status in ingest([logs], store).files] == [FileOutcome.OK] * 2
     assert store.matches()["complete"].to_pylist() == [True]
     assert ingest([logs], store).unchanged == 1
 
@@ -121,11 +121,11 @@ def test_a_game_log_that_grows_replaces_its_match(logs: Path, store: Store) -> N
     whole = (logs / f"{PLAIN}.rcg.gz").read_bytes()
     (logs / f"{PLAIN}.rcg.gz").write_bytes(whole[: len(whole) // 2])
     first = ingest([logs], store)
-    assert first.files[0].outcome is Outcome.PARTIAL
+    assert first.files[0].outcome is FileOutcome.PARTIAL
     (old,) = store.match_ids()
     (logs / f"{PLAIN}.rcg.gz").write_bytes(whole)
     second = ingest([logs], store)
-    assert {status.outcome for status in second.files} == {Outcome.OK}
+    assert {status.outcome for status in second.files} == {FileOutcome.OK}
     (new,) = store.match_ids()
     assert new != old
 
@@ -150,19 +150,19 @@ def test_one_bad_file_does_not_stop_the_others(logs: Path, store: Store) -> None
     by_name = {Path(status.path).name: status for status in report.files}
     for name in bad:
         status = by_name[name]
-        assert (status.outcome, status.match_id, status.rows) == (Outcome.FAILED, None, 0), name
+        assert (status.outcome, status.match_id, status.rows) == (FileOutcome.FAILED, None, 0), name
         assert status.error is not None
         assert name in status.error
         assert "\n" not in status.error
-    assert report.count(Outcome.FAILED) == len(bad)
-    assert report.count(Outcome.OK) == 2
+    assert report.count(FileOutcome.FAILED) == len(bad)
+    assert report.count(FileOutcome.OK) == 2
 
 
 def test_a_bad_command_log_costs_only_the_commands(logs: Path, store: Store) -> None:
     (logs / f"{PLAIN}.rcl.gz").write_bytes(b"\x1f\x8bnonsense")
     report = ingest([logs], store)
     game, commands = report.files
-    assert (game.rows, commands.rows, commands.outcome) == (199, 0, Outcome.FAILED)
+    assert (game.rows, commands.rows, commands.outcome) == (199, 0, FileOutcome.FAILED)
     assert commands.error is not None
     assert f"{PLAIN}.rcl.gz" in commands.error
     assert store.matches()["n_frames"].to_pylist() == [199]
@@ -222,7 +222,7 @@ def test_a_dead_worker_costs_its_own_match(
     monkeypatch.setattr(module, "run_tasks", one_dies)
     report = ingest([logs, fixtures_dir / "json"], store)
     assert report.added == 1
-    failed = [status for status in report.files if status.outcome is Outcome.FAILED]
+    failed = [status for status in report.files if status.outcome is FileOutcome.FAILED]
     assert len(failed) == 2
     assert all("was killed" in str(status.error) for status in failed)
     monkeypatch.undo()
@@ -242,7 +242,7 @@ def test_a_defect_of_the_reader_costs_its_own_match(
 
     monkeypatch.setattr(module, "read_pair", broken)
     report = ingest([logs, fixtures_dir / "json"], store, jobs=1)
-    assert (report.added, report.count(Outcome.FAILED)) == (1, 2)
+    assert (report.added, report.count(FileOutcome.FAILED)) == (1, 2)
     assert "IndexError" in str(report.files[-1].error) or "IndexError" in str(report.files[0].error)
 
 
@@ -299,7 +299,7 @@ def complete(samples: Path, root: Path) -> None:
     store = open_store(root)
     before = len(store.match_ids())
     report = ingest([samples], store, jobs=1)
-    assert report.count(Outcome.OK) == 8
+    assert report.count(FileOutcome.OK) == 8
     assert (report.added, report.replaced, report.unchanged) == (4 - before, 0, before)
     assert len(store.match_ids()) == 4
     assert list((root / "unfinished").iterdir()) == []

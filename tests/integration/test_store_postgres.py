@@ -18,8 +18,8 @@ from postgres import DATABASE, ENCODED, PASSWORD, Server, start_server
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.logs import read_match
 from teamclone.store import Store, create_store, ingest, open_store, schema
-from teamclone.store.postgres import Location
-from teamclone.store.status import Outcome
+from teamclone.store.postgres.location import Location
+from teamclone.store.status import FileOutcome
 
 N_MATCHES = 2
 
@@ -224,7 +224,7 @@ def test_bad_files_have_their_status(url: str, fixtures_dir: Path, tmp_path: Pat
     (logs / "empty.rcg").write_bytes(b"")
     store = create_store(url)
     first = ingest([logs], store, jobs=1)
-    assert {first.count(outcome) for outcome in (Outcome.PARTIAL, Outcome.FAILED)} == {1, 2}
+    assert {first.count(outcome) for outcome in (FileOutcome.PARTIAL, FileOutcome.FAILED)} == {1, 2}
     assert tuple(store.files()) == first.files
     assert ingest([logs], open_store(url), jobs=1).files == first.files
 

@@ -22,7 +22,7 @@ def ingest(
     from teamclone.cli.common import print_json, print_table, progress
     from teamclone.store import create_store
     from teamclone.store.ingest import ingest as run
-    from teamclone.store.status import Outcome
+    from teamclone.store.status import FileOutcome
     from teamclone.system.cluster import executor_of
 
     with executor_of(scheduler, jobs=jobs) as executor, progress("ingest") as bar:
@@ -38,18 +38,18 @@ def ingest(
     if as_json:
         print_json(report.to_json())
     else:
-        odd = [status for status in report.files if status.outcome is not Outcome.OK]
+        odd = [status for status in report.files if status.outcome is not FileOutcome.OK]
         if odd:
             print_table(
                 ("status", "rows", "first problem"),
                 [(status.outcome, status.rows, status.error or status.path) for status in odd],
                 numeric=(1,),
             )
-        counts = ", ".join(f"{report.count(outcome)} {outcome}" for outcome in Outcome)
+        counts = ", ".join(f"{report.count(outcome)} {outcome}" for outcome in FileOutcome)
         print(f"files: {counts}")
         print(
             f"matches: {report.added} added, {report.replaced} replaced, {report.unchanged} there before; "
             f"{report.seconds:.1f} s"
         )
-    if report.count(Outcome.FAILED):
+    if report.count(FileOutcome.FAILED):
         raise typer.Exit(1)

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from teamclone.store.store import Rows
+    from teamclone.store.store import QueryRows
 
 SHOWN = 200
 """Rows of a table on the terminal; --csv and --json print all."""
@@ -38,7 +38,7 @@ def sql(
         print_rows(rows)
 
 
-def values(rows: Rows) -> Iterator[list[Any]]:
+def values(rows: QueryRows) -> Iterator[list[Any]]:
     """The rows as Python values that JSON and CSV have."""
     import pyarrow as pa
 
@@ -69,7 +69,7 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
-def print_csv(rows: Rows) -> None:
+def print_csv(rows: QueryRows) -> None:
     """CSV with a header; NULL is empty, a list or structure is JSON."""
     import csv
 
@@ -79,7 +79,7 @@ def print_csv(rows: Rows) -> None:
         writer.writerow([json.dumps(value) if isinstance(value, list | dict) else value for value in row])
 
 
-def print_objects(rows: Rows) -> None:
+def print_objects(rows: QueryRows) -> None:
     """A JSON list, an object a line, written as the rows come."""
     names, before = rows.schema.names, "["
     for row in values(rows):
@@ -88,7 +88,7 @@ def print_objects(rows: Rows) -> None:
     print("[]" if before == "[" else "]")
 
 
-def print_rows(rows: Rows) -> None:
+def print_rows(rows: QueryRows) -> None:
     """A table of the first rows, and on stderr a line about the others."""
     from itertools import islice
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from teamclone.store.validate import Verdict
+    from teamclone.store.validate import MatchCheck
 
 
 def validate(
@@ -41,41 +41,41 @@ def validate(
         def on_progress(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
-        for verdict in chain(
+        for checked in chain(
             validate_logs(logs, jobs=jobs, on_progress=on_progress) if logs else (),
             *(validate_store(open_store(place), jobs=jobs, on_progress=on_progress) for place in stores),
         ):
-            print(json.dumps(as_object(verdict), ensure_ascii=False) if as_json else line(verdict))
+            print(json.dumps(as_object(checked), ensure_ascii=False) if as_json else line(checked))
             total += 1
-            wrong += bool(verdict.wrong)
+            wrong += bool(checked.wrong)
     if not as_json:
         print(f"{total} matches, {wrong} with something wrong")
     if wrong:
         raise typer.Exit(1)
 
 
-def line(verdict: Verdict) -> str:
+def line(checked: MatchCheck) -> str:
     """``ok     match.rcg.gz: 5999 frames, 700123 commands`` or ``wrong  ...`` with the first thing that is wrong."""
-    if not verdict.wrong:
-        return f"ok     {verdict.name}: {verdict.frames} frames, {verdict.commands} commands"
-    first, *more = verdict.wrong
+    if not checked.wrong:
+        return f"ok     {checked.name}: {checked.frames} frames, {checked.commands} commands"
+    first, *more = checked.wrong
     first = " ".join(first.split())
-    name = "" if verdict.name in first else f"{verdict.name}: "
+    name = "" if checked.name in first else f"{checked.name}: "
     return f"wrong  {name}{first}" + (f" ({len(more)} more; --json lists all)" if more else "")
 
 
-def as_object(verdict: Verdict) -> dict[str, Any]:
+def as_object(checked: MatchCheck) -> dict[str, Any]:
     """What ``--json`` prints of a match."""
     from teamclone.cli.info import problem_json
 
     return {
-        "name": verdict.name,
-        "match_id": verdict.match_id,
-        "ok": not verdict.wrong,
-        "frames": verdict.frames,
-        "commands": verdict.commands,
-        "error": verdict.error,
-        "problems": [problem_json(problem) for problem in verdict.problems],
+        "name": checked.name,
+        "match_id": checked.match_id,
+        "ok": not checked.wrong,
+        "frames": checked.frames,
+        "commands": checked.commands,
+        "error": checked.error,
+        "problems": [problem_json(problem) for problem in checked.problems],
         "findings": [
             {
                 "check": finding.check.name,
@@ -84,6 +84,6 @@ def as_object(verdict: Verdict) -> dict[str, Any]:
                 "cycle": finding.cycle,
                 "what": finding.what,
             }
-            for finding in verdict.findings
+            for finding in checked.findings
         ],
     }

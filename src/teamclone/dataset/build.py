@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,7 +18,7 @@ from teamclone.dataset import clean, layout
 from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
-from teamclone.errors import DatasetError, UsageError
+from teamclone.errors import DatasetError, UsageError, choose
 from teamclone.rcss import server_params
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
@@ -313,19 +312,14 @@ def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
             )
     for name in config.teams:
         if name not in teams:
-            raise UsageError(f"team {name!r} is in no match of the store{_hint(name, teams)}")
+            raise UsageError(f"team {name!r} is in no match of the store; {choose(name, sorted(teams))}")
     opponents = {entry.opponent for entry in entries}
     for name in config.unseen:
         if name not in opponents:
-            raise UsageError(f"unseen opponent {name!r} plays in no match of {config.team}{_hint(name, opponents)}")
+            remedy = choose(name, sorted(opponents))
+            raise UsageError(f"unseen opponent {name!r} plays in no match of {config.team}; {remedy}")
     without = len(rows) - len({entry.match_id for entry in entries})
     return sorted(entries, key=lambda entry: entry.match_id), without
-
-
-def _hint(name: str, known: Counter[str] | set[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1)
-    names = ", ".join(sorted(known))
-    return f"; did you mean {near[0]!r}?" if near else f"; known: {names or 'none'}"
 
 
 def _fixed(entries: Sequence[_Entry], config: DatasetConfig) -> dict[str, layout.Split]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +32,7 @@ from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import OTHER_SIDE
 from teamclone.rcss.server_params import SERVER_FIELD
+from teamclone.system.documents import read_document
 from teamclone.world.channels import CHANNEL
 from teamclone.world.state import State, Target
 
@@ -227,18 +227,9 @@ def open_dataset(path: Path | str) -> Dataset:
     """
     folder = Path(path)
     document = folder / "dataset.json"
-    if not document.is_file():
-        what = "no such folder" if not folder.exists() else "not a dataset, it has no dataset.json"
-        raise DatasetError(f"{folder}: {what}; make one with `teamclone dataset`")
-    try:
-        meta = json.loads(document.read_text(encoding="utf-8"))
-        found = meta["format"]
-    except (ValueError, TypeError, KeyError, IndexError) as error:
-        raise DatasetError(f"{document}: not the description of a dataset ({error!r})") from None
-    if found != FORMAT:
-        raise DatasetError(
-            f"{folder}: dataset of format {found}, this version reads {FORMAT}; make it again with `teamclone dataset`"
-        )
+    meta = read_document(
+        document, what="a dataset", number=FORMAT, command="teamclone dataset", error=DatasetError, folder=folder
+    )
     absent = [key for key in ("id", "team", "matches", "n_frames", "n_samples") if key not in meta]
     if absent:
         raise DatasetError(f"{document}: lacks {', '.join(absent)}; make it again with `teamclone dataset`")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
-import json
 import os
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +18,7 @@ from teamclone.errors import DatasetError
 from teamclone.rcss.commands import CLONED
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.server_params import SERVER_DEFAULTS, SERVER_FIELD
+from teamclone.system.documents import write_document, write_errors
 from teamclone.system.files import held
 
 _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
@@ -114,8 +113,7 @@ class DatasetWriter:
             "n_frames": self.n_frames,
             "n_samples": self.n_samples,
         }
-        text = json.dumps(document, ensure_ascii=False, indent=2, default=str)
-        (self._folder / "dataset.json").write_text(text + "\n", encoding="utf-8")
+        write_document(self._folder / "dataset.json", document)
         self.finished = True
 
     def close(self) -> None:
@@ -269,14 +267,6 @@ def _tidy(folder: Path) -> None:
                 shutil.rmtree(left, ignore_errors=True)
 
 
-@contextmanager
-def _in_words(folder: Path) -> Iterator[None]:
-    """Turn the system's refusal to write into one clear line."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            text = "the disk is full; make room, or choose another folder"
-        else:
-            text = f"cannot be written ({error.strerror or error}); choose another folder"
-        raise DatasetError(f"{folder}: {text}") from error
+def _in_words(folder: Path) -> AbstractContextManager[None]:
+    remedy = "choose another folder"
+    return write_errors(folder, error=DatasetError, full=f"make room, or {remedy}", denied=remedy)

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from teamclone import __version__
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
-from teamclone.errors import DatasetError
+from teamclone.errors import DatasetError, RunError
 from teamclone.evaluation import baselines as rules
 from teamclone.evaluation import bootstrap
 from teamclone.evaluation.answers import BATCH
 from teamclone.evaluation.characterise import characterise
 from teamclone.evaluation.describe import describe, unseen_numbers
-from teamclone.evaluation.documents import read_document
 from teamclone.evaluation.predict import predict, truth
 from teamclone.models.clone import model_id, parameter_count
-from teamclone.system.files import write_json
+from teamclone.system.documents import read_document, write_document
 
 if TYPE_CHECKING:
     from teamclone.training.run import Run
@@ -213,10 +212,10 @@ def evaluation_path(run: Run, evaluation: dict[str, Any]) -> Path:
 def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
     """Write an evaluation into its run, whole or not at all; where it went."""
     path = evaluation_path(run, evaluation)
-    write_json(path, evaluation)
+    write_document(path, evaluation)
     return path
 
 
 def load_evaluation(path: Path | str) -> dict[str, Any]:
     """Read an evaluation back; raises as `read_document`."""
-    return read_document(Path(path), number=FORMAT, what="an evaluation", command="teamclone evaluate")
+    return read_document(Path(path), what="an evaluation", number=FORMAT, command="teamclone evaluate", error=RunError)

@@ -14,11 +14,10 @@ import torch
 
 from teamclone import __version__
 from teamclone.dataset.reader import Dataset, open_dataset
-from teamclone.errors import DatasetError
-from teamclone.evaluation.documents import read_document
+from teamclone.errors import DatasetError, RunError
 from teamclone.models.clone import model_id
 from teamclone.rcss.players import N_PLAYERS
-from teamclone.system.files import write_json
+from teamclone.system.documents import read_document, write_document
 from teamclone.system.machine import processor
 from teamclone.world.state import State
 
@@ -61,7 +60,7 @@ def measure_run(
     data = dataset if isinstance(dataset, Dataset) else open_dataset(dataset or run.dataset_path)
     bench = measure_latency(run.load_model(checkpoint), data, n=n, on_progress=on_progress)
     path = run.path / "bench.json"
-    write_json(path, bench)
+    write_document(path, bench)
     return bench, path
 
 
@@ -144,4 +143,4 @@ def _summary(times: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, f
 
 def load_bench(path: Path | str) -> dict[str, Any]:
     """Read bench.json back; raises as `read_document`."""
-    return read_document(Path(path), number=FORMAT, what="a benchmark", command="teamclone bench")
+    return read_document(Path(path), what="a benchmark", number=FORMAT, command="teamclone bench", error=RunError)

@@ -13,7 +13,7 @@ from typing import Any, Self
 from teamclone.errors import PlayError
 from teamclone.play.schedule import TeamSpec
 from teamclone.rcss.players import N_TEAM
-from teamclone.system.files import write_json
+from teamclone.system.documents import check_format, write_document
 
 FORMAT = 2
 NAME = "match.json"
@@ -176,7 +176,7 @@ def bury_logs(folder: Path) -> None:
 
 def save_record(folder: Path, record: Record) -> None:
     """Write the record of a match into its folder."""
-    write_json(folder / NAME, record.to_json())
+    write_document(folder / NAME, record.to_json())
 
 
 def load_record(folder: Path) -> Record | None:
@@ -187,8 +187,14 @@ def load_record(folder: Path) -> Record | None:
     """
     try:
         values = json.loads((folder / NAME).read_bytes())
-        if values["format"] != FORMAT:
-            raise PlayError(f"{folder / NAME}: has format {values['format']}, expected {FORMAT}; choose another --out")
+        check_format(
+            values["format"],
+            number=FORMAT,
+            what="match record",
+            where=folder / NAME,
+            again="choose another --out",
+            error=PlayError,
+        )
         return Record.from_json(values)
     except (FileNotFoundError, NotADirectoryError):
         return None

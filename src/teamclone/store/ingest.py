@@ -14,7 +14,7 @@ from teamclone.errors import LogError, TeamcloneError, UsageError
 from teamclone.logs import LogPair, Severity, find_matches, read_pair
 from teamclone.logs.match import Match
 from teamclone.store.shared import SharedStore
-from teamclone.store.status import FileStatus, Outcome, stamp
+from teamclone.store.status import FileOutcome, FileStatus, stamp
 from teamclone.store.store import Added, Store
 from teamclone.system.files import digest
 from teamclone.system.workers import DIED, Died, run_tasks
@@ -39,14 +39,14 @@ class IngestReport:
     unchanged: int
     seconds: float
 
-    def count(self, outcome: Outcome) -> int:
+    def count(self, outcome: FileOutcome) -> int:
         """Files with this outcome."""
         return sum(status.outcome is outcome for status in self.files)
 
     def to_json(self) -> dict[str, Any]:
         return {
             "matches": {"added": self.added, "replaced": self.replaced, "unchanged": self.unchanged},
-            "files": {str(outcome): self.count(outcome) for outcome in Outcome},
+            "files": {str(outcome): self.count(outcome) for outcome in FileOutcome},
             "seconds": round(self.seconds, 3),
             "status": [status.to_json() for status in self.files],
         }
@@ -187,7 +187,7 @@ def _ingest_one(task: _Task) -> _Result:
     statuses = tuple(_status(match, path, stamps[path]) for path in files_of(task.pair))
     if task.strict:
         for status in statuses:
-            if status.outcome is not Outcome.OK:
+            if status.outcome is not FileOutcome.OK:
                 raise LogError(f"{status.error} (--strict)")
     return _Result(statuses=statuses, added=task.store.open().add(match))
 
@@ -208,18 +208,18 @@ def _status(match: Match, path: Path, stamped: tuple[int, int]) -> FileStatus:
         problem for problem in match.problems if problem.path in (None, path) and problem.severity is not Severity.NOTE
     ]
     if path == match.rcg_path:
-        rows, content, outcome = len(match.frames["cycle"]), match.match_id, Outcome.OK
+        rows, content, outcome = len(match.frames["cycle"]), match.match_id, FileOutcome.OK
     elif path == match.rcl_path and match.log is not None:
-        rows, content, outcome = len(match.commands["cycle"]), digest(match.log.text), Outcome.OK
+        rows, content, outcome = len(match.commands["cycle"]), digest(match.log.text), FileOutcome.OK
     else:
-        rows, content, outcome = 0, None, Outcome.FAILED
-    if wrong and outcome is Outcome.OK:
-        outcome = Outcome.PARTIAL
+        rows, content, outcome = 0, None, FileOutcome.FAILED
+    if wrong and outcome is FileOutcome.OK:
+        outcome = FileOutcome.PARTIAL
     return FileStatus(
         path=str(path.absolute()),
         outcome=outcome,
         rows=rows,
-        match_id=match.match_id if outcome is not Outcome.FAILED else None,
+        match_id=match.match_id if outcome is not FileOutcome.FAILED else None,
         error=str(wrong[0]) if wrong else None,
         size=stamped[0],
         mtime_ns=stamped[1],
@@ -232,7 +232,7 @@ def _failed(pair: LogPair, text: str, stamps: dict[Path, tuple[int, int]]) -> _R
         statuses=tuple(
             FileStatus(
                 path=str(path.absolute()),
-                outcome=Outcome.FAILED,
+                outcome=FileOutcome.FAILED,
                 rows=0,
                 match_id=None,
                 error=text,

@@ -17,7 +17,7 @@ def create_store(location: str | Path) -> Store:
         UsageError: the URL is wrong.
     """
     if url := _url(location):
-        from teamclone.store.postgres import PostgresStore
+        from teamclone.store.postgres.store import PostgresStore
 
         return PostgresStore.create(url)
     return ParquetStore.create(Path(location))
@@ -32,7 +32,7 @@ def open_store(location: str | Path) -> Store:
         UsageError: the URL is wrong.
     """
     if url := _url(location):
-        from teamclone.store.postgres import PostgresStore
+        from teamclone.store.postgres.store import PostgresStore
 
         return PostgresStore.open(url)
     return ParquetStore.open(Path(location))

@@ -10,10 +10,9 @@ import sys
 import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import duckdb
 import pyarrow as pa
@@ -22,13 +21,14 @@ import pyarrow.parquet as pq
 from teamclone import __version__
 from teamclone.errors import StoreError, UsageError
 from teamclone.logs.columns import COUNTERS, counter_name
-from teamclone.logs.match import Columns, Match
+from teamclone.logs.match import Match
 from teamclone.store import convert, schema
 from teamclone.store.convert import Sources, Tables
 from teamclone.store.schema import Table
 from teamclone.store.status import FileStatus
-from teamclone.store.store import Added, Rows
-from teamclone.system.files import digest, held, write_atomic
+from teamclone.store.store import Added, QueryRows, Store
+from teamclone.system.documents import document_bytes, first_line, write_document, write_errors
+from teamclone.system.files import digest, held
 
 KIND = "teamclone store"
 MARKER = "store.json"
@@ -48,7 +48,7 @@ STATISTICS = ("match_id", "frame", "cycle")
 """Columns by which queries choose rows: the others need no least and greatest value."""
 
 
-class ParquetStore:
+class ParquetStore(Store):
     """A store in a folder. The layout is described by ``schema.markdown()``."""
 
     def __init__(self, root: Path) -> None:
@@ -96,7 +96,7 @@ class ParquetStore:
             store = cls(root)
             for folder in (store._matches, store._files, store._unfinished):
                 folder.mkdir(exist_ok=True)
-            write_atomic(store.root / MARKER, _json(marker))
+            write_document(store.root / MARKER, marker)
         return store
 
     # -- reading ---------------------------------------------------------------------------------------------------
@@ -118,17 +118,9 @@ class ParquetStore:
                 raise StoreError(schema.unknown("match", match_id, tuple(known), where=str(self.root))) from None
             raise StoreError(f"{path}: is missing; {_remedy(path)}") from None
         except (pa.ArrowException, OSError) as error:
-            raise StoreError(f"{path}: cannot be read ({_first_line(error)}); {_remedy(path)}") from error
+            raise StoreError(f"{path}: cannot be read ({first_line(error)}); {_remedy(path)}") from error
 
-    def read_match_columns(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> Columns:
-        wanted = schema.table(table)
-        names = columns if columns is not None else [name for name in wanted.names if name != schema.MATCH_ID.name]
-        return convert.numpy_columns(wanted, self.read_table(match_id, table, columns=names))
-
-    def read_parameters(self, match_id: str) -> dict[str, dict[str, float | str]]:
-        return convert.parameters(self.read_table(match_id, schema.PARAMETERS.name))
-
-    def stream(self, query: str) -> Rows:
+    def stream(self, query: str) -> QueryRows:
         connection = self._connect()
         try:
             statements = duckdb.extract_statements(query)
@@ -142,11 +134,7 @@ class ParquetStore:
             reader = pa.RecordBatchReader.from_stream(connection.sql(query))
         except duckdb.Error as error:
             raise UsageError(_sql_error(error)) from None
-        return Rows(reader.schema, _batches(reader))
-
-    def sql(self, query: str) -> pa.Table:
-        rows = self.stream(query)
-        return pa.Table.from_batches(rows.batches, rows.schema)
+        return QueryRows(reader.schema, _batches(reader))
 
     def _connect(self) -> duckdb.DuckDBPyConnection:
         """A database in memory with the views: the store may be read-only, moved, or growing meanwhile."""
@@ -219,7 +207,7 @@ class ParquetStore:
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
         with _writing(self.root):
             for status in statuses:
-                write_atomic(self._files / f"{status.key}.json", _json(status.to_json()))
+                write_document(self._files / f"{status.key}.json", status.to_json())
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -307,10 +295,6 @@ def _remedy(path: Path) -> str:
     return f"remove the folder {path.parent} and ingest the match again"
 
 
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
-
-
 def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Sources) -> None:
     """All files of a match, on disk when this returns."""
     for name, rows in tables.items():
@@ -335,14 +319,10 @@ def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Source
             for table in schema.MATCH_TABLES
         },
     }
-    (folder / "meta.json").write_bytes(_json(meta))
+    (folder / "meta.json").write_bytes(document_bytes(meta))
     # All at the end, so that the disk is not waited for while there is work.
     for path in (*folder.iterdir(), folder):
         _sync(path)
-
-
-def _json(value: Any) -> bytes:
-    return (json.dumps(value, indent=1) + "\n").encode()
 
 
 def _sync(path: Path) -> None:
@@ -356,17 +336,11 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-@contextmanager
-def _writing(root: Path) -> Iterator[None]:
-    """Turn the system's refusal to write into one clear line."""
-    try:
-        yield
-    except (OSError, pa.ArrowException, duckdb.IOException) as error:
-        number = getattr(error, "errno", None)
-        if number in (errno.ENOSPC, errno.EDQUOT) or "No space left" in str(error):
-            text = "the disk is full; make room and ingest again, what is there already stays"
-        elif number in (errno.EACCES, errno.EPERM, errno.EROFS):
-            text = f"cannot be written ({os.strerror(number)}); name a folder of your own with --store"
-        else:
-            text = f"cannot be written ({_first_line(error)})"
-        raise StoreError(f"{root}: {text}") from error
+def _writing(root: Path) -> AbstractContextManager[None]:
+    return write_errors(
+        root,
+        error=StoreError,
+        full="make room and ingest again, what is there already stays",
+        denied="name a folder of your own with --store",
+        kinds=(OSError, pa.ArrowException, duckdb.IOException),
+    )

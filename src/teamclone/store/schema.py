@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from teamclone import __version__
-from teamclone.errors import StoreError, UsageError
+from teamclone.errors import StoreError, UsageError, choose
 from teamclone.logs import columns
 from teamclone.logs.columns import Column
 from teamclone.rcss import player_types
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.system import documents
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -98,11 +98,7 @@ class Table:
 
 def unknown(what: str, name: str, known: tuple[str, ...], *, where: str) -> str:
     """The text of an error about a name that does not exist, with near matches."""
-    import difflib
-
-    near = difflib.get_close_matches(name, known, n=3)
-    hint = f"; did you mean {' or '.join(near)}?" if near else f"; it has {', '.join(known)}"
-    return f"{where} has no {what} {name!r}{hint}"
+    return f"{where} has no {what} {name!r}; {choose(name, known)}"
 
 
 def _field(name: str, dtype: str, unit: str, about: str) -> Field:
@@ -310,13 +306,15 @@ def check_format(number: object, version: object, *, where: str, place: str) -> 
     Raises:
         StoreError: the text names the numbers and the remedy.
     """
-    if number == FORMAT:
-        return
     newer = isinstance(number, int) and number > FORMAT
-    remedy = "update teamclone" if newer else f"ingest the logs anew into another {place}"
-    raise StoreError(
-        f"{where}: this store has format {number}, written by teamclone {version}, "
-        f"but teamclone {__version__} reads format {FORMAT}: {remedy}"
+    documents.check_format(
+        number,
+        number=FORMAT,
+        what="store",
+        where=where,
+        again="update teamclone" if newer else f"ingest the logs anew into another {place}",
+        error=StoreError,
+        writer=version,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 from teamclone.system.files import digest
 
 
-class Outcome(StrEnum):
+class FileOutcome(StrEnum):
     """``ok``: read whole; ``partial``: some records or the rest of the file were lost; ``failed``: nothing was kept."""
 
     OK = "ok"
@@ -34,7 +34,7 @@ class FileStatus:
     """
 
     path: str
-    outcome: Outcome
+    outcome: FileOutcome
     rows: int
     match_id: str | None
     error: str | None
@@ -55,7 +55,7 @@ class FileStatus:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
-        return cls(**{**values, "outcome": Outcome(values["outcome"])})
+        return cls(**{**values, "outcome": FileOutcome(values["outcome"])})
 
 
 def key_of(path: Path) -> str:

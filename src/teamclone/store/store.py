@@ -1,4 +1,4 @@
-"""What a store offers, whatever keeps its rows, and how to open one."""
+"""What a store offers, whatever keeps its rows."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
+
+import pyarrow as pa
 
 from teamclone.logs.match import Columns, Match
+from teamclone.store import convert, schema
 from teamclone.store.status import FileStatus
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 
 class Added(StrEnum):
@@ -26,7 +26,7 @@ class Added(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class QueryRows:
     """The answer to a query, read batch by batch."""
 
     schema: pa.Schema
@@ -63,11 +63,15 @@ class Store(Protocol):
         ``player_states`` columns have the shape (n_frames, 22), left 1..11 then right 1..11; those of every other table
         (n_rows,). ``columns`` None gives all but ``match_id``. Raises as ``read_table``.
         """
+        wanted = schema.table(table)
+        names = columns if columns is not None else [name for name in wanted.names if name != schema.MATCH_ID.name]
+        return convert.numpy_columns(wanted, self.read_table(match_id, table, columns=names))
 
     def read_parameters(self, match_id: str) -> dict[str, dict[str, float | str]]:
         """The parameters of one match: ``{"server": {"ball_decay": 0.94, ...}, "player": {...}}``."""
+        return convert.parameters(self.read_table(match_id, schema.PARAMETERS.name))
 
-    def stream(self, query: str) -> Rows:
+    def stream(self, query: str) -> QueryRows:
         """The answer to a query that only reads.
 
         Raises:
@@ -76,6 +80,8 @@ class Store(Protocol):
 
     def sql(self, query: str) -> pa.Table:
         """All of the answer to a query that only reads. Raises as ``stream``."""
+        rows = self.stream(query)
+        return pa.Table.from_batches(rows.batches, rows.schema)
 
     def add(self, match: Match) -> Added:
         """Take in a match: all of it or, if that fails, nothing.

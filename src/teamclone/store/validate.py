@@ -22,7 +22,7 @@ OnProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class MatchCheck:
     """What was found about one match.
 
     Attributes:
@@ -50,8 +50,8 @@ class Verdict:
 
 def validate_logs(
     paths: Iterable[Path], *, jobs: int | None = None, on_progress: OnProgress | None = None
-) -> Iterator[Verdict]:
-    """A verdict on every match in these files and folders, in the order of their paths. Writes nothing.
+) -> Iterator[MatchCheck]:
+    """Check every match in these files and folders, in the order of their paths. Writes nothing.
 
     Raises:
         UsageError: a path does not exist, or there is no log under any of them.
@@ -61,40 +61,35 @@ def validate_logs(
 
 def validate_store(
     store: Store, *, jobs: int | None = None, on_progress: OnProgress | None = None
-) -> Iterator[Verdict]:
-    """A verdict on every match of a store: its tables can be read, have the rows they should, and break no rule."""
+) -> Iterator[MatchCheck]:
+    """Check every match of a store: its tables can be read, have the rows they should, and break no rule."""
     tasks = [(store.location, match_id) for match_id in store.match_ids()]
     yield from _in_order(_validate_stored, tasks, jobs=jobs, on_progress=on_progress)
 
 
 def _in_order(
-    function: Callable[[T], Verdict], tasks: Sequence[T], *, jobs: int | None, on_progress: OnProgress | None
-) -> Iterator[Verdict]:
-    """The verdicts on all tasks, in their order, as soon as that allows."""
-    verdicts: dict[T, Verdict] = {}
-    shown = 0
-    for task, outcome in run_tasks(function, tasks, jobs=jobs):
-        verdicts[task] = _dead(task) if isinstance(outcome, Died) else outcome
+    function: Callable[[T], MatchCheck], tasks: Sequence[T], *, jobs: int | None, on_progress: OnProgress | None
+) -> Iterator[MatchCheck]:
+    """The checks of all tasks, in their order."""
+    for done, (task, outcome) in enumerate(run_tasks(function, tasks, jobs=jobs, in_order=True), 1):
         if on_progress is not None:
-            on_progress(len(verdicts), len(tasks))
-        while shown < len(tasks) and tasks[shown] in verdicts:
-            yield verdicts[tasks[shown]]
-            shown += 1
+            on_progress(done, len(tasks))
+        yield _dead(task) if isinstance(outcome, Died) else outcome
 
 
-def _dead(task: LogPair | tuple[str, str]) -> Verdict:
+def _dead(task: LogPair | tuple[str, str]) -> MatchCheck:
     name = str(task.path) if isinstance(task, LogPair) else task[1]
-    return Verdict(name=name, error=f"{name}: the process that checked it was killed, perhaps out of memory")
+    return MatchCheck(name=name, error=f"{name}: the process that checked it was killed, perhaps out of memory")
 
 
-def _validate_pair(pair: LogPair) -> Verdict:
+def _validate_pair(pair: LogPair) -> MatchCheck:
     try:
         match = read_pair(pair)
     except LogError as error:
-        return Verdict(name=str(pair.path), error=str(error))
+        return MatchCheck(name=str(pair.path), error=str(error))
     except OSError as error:
-        return Verdict(name=str(pair.path), error=f"{pair.path}: {error.strerror or error}")
-    return Verdict(
+        return MatchCheck(name=str(pair.path), error=f"{pair.path}: {error.strerror or error}")
+    return MatchCheck(
         name=str(pair.path),
         match_id=match.match_id,
         frames=len(match.frames["cycle"]),
@@ -104,27 +99,27 @@ def _validate_pair(pair: LogPair) -> Verdict:
     )
 
 
-def _validate_stored(task: tuple[str, str]) -> Verdict:
+def _validate_stored(task: tuple[str, str]) -> MatchCheck:
     location, match_id = task
     store = open_store(location)
     try:
         tables = {table.name: store.read_table(match_id, table.name) for table in schema.MATCH_TABLES}
     except StoreError as error:
-        return Verdict(name=match_id, match_id=match_id, error=str(error))
+        return MatchCheck(name=match_id, match_id=match_id, error=str(error))
     about = tables[schema.MATCHES.name].to_pylist()
     if len(about) != 1:
-        return Verdict(
+        return MatchCheck(
             name=match_id, match_id=match_id, error=f"{match_id}: expected one row in matches, got {len(about)}"
         )
     for name in ("frames", "commands", "events", "problems"):
         if about[0][f"n_{name}"] != tables[name].num_rows:
-            return Verdict(
+            return MatchCheck(
                 name=match_id,
                 match_id=match_id,
                 error=f"{match_id}: expected {about[0][f'n_{name}']} rows in {name}, got {tables[name].num_rows}; "
                 "remove the match and ingest it again",
             )
-    return Verdict(
+    return MatchCheck(
         name=match_id,
         match_id=match_id,
         frames=about[0]["n_frames"],

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 
 def write_atomic(path: Path, data: bytes) -> None:
@@ -26,24 +24,6 @@ def write_atomic(path: Path, data: bytes) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write a document so that a reader sees the old one or the new one; lists stay on one line."""
-    write_atomic(path, f"{_layout(document)}\n".encode())
-
-
-def _layout(value: Any, indent: str = "") -> str:
-    """Objects over many lines, everything else on one: readable, and a diff shows what changed."""
-    if not isinstance(value, dict) or not value:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False, default=str)
-    if set(value) == {"value", "low", "high"}:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False)
-    inner = indent + " "
-    lines = [
-        f"{inner}{json.dumps(str(key), ensure_ascii=False)}: {_layout(item, inner)}" for key, item in value.items()
-    ]
-    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
 
 
 def digest(data: bytes) -> str:

@@ -32,6 +32,7 @@ from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError, UsageError
 from teamclone.models.clone import Clone
 from teamclone.rcss.commands import REPERTOIRE
+from teamclone.system.documents import not_a_document, read_document, write_document
 from teamclone.system.files import held, write_atomic
 from teamclone.system.machine import processor
 from teamclone.training.checkpoint import load_weights, save_weights
@@ -169,17 +170,21 @@ def open_run(path: Path | str) -> Run:
     """
     folder = Path(path)
     environment_path, config_path = folder / "environment.json", folder / "config.toml"
-    if not environment_path.is_file() or not config_path.is_file():
-        what = "not a run, it has no config.toml and environment.json" if folder.exists() else "no such folder"
-        raise RunError(f"{folder}: {what}; make one with `teamclone train`")
+    environment = read_document(
+        environment_path,
+        what="a run",
+        number=FORMAT,
+        command="teamclone train",
+        error=RunError,
+        folder=folder,
+        again="train again",
+    )
     try:
-        environment = json.loads(environment_path.read_text(encoding="utf-8"))
-        found, dataset = environment["format"], environment["dataset"]
-        _ = dataset["path"], dataset["id"]
-    except (ValueError, TypeError, KeyError) as error:
-        raise RunError(f"{environment_path}: not the description of a run ({error!r})") from None
-    if found != FORMAT:
-        raise RunError(f"{folder}: run of format {found}, this version reads {FORMAT}; train again")
+        _ = environment["dataset"]["path"], environment["dataset"]["id"]
+    except (TypeError, KeyError) as error:
+        raise RunError(not_a_document(environment_path, "the description of a run", error)) from None
+    if not config_path.is_file():
+        raise RunError(f"{folder}: not a run, it has no config.toml; make one with `teamclone train`")
     try:
         config = config_from(tomllib.loads(config_path.read_text(encoding="utf-8")), where=str(config_path))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -215,13 +220,12 @@ def create_run(
         raise RunError(f"{path}: is not an empty folder; choose another one")
     resources = {"device": device, "precision": precision, "processes": processes}
     origin = {"base": base.origin} if base else {}
-    text = json.dumps(_environment(dataset) | resources | origin, indent=2) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         (temporary / "checkpoints").mkdir(parents=True)
         save_config(temporary, config)
-        write_atomic(temporary / "environment.json", text.encode())
+        write_document(temporary / "environment.json", _environment(dataset) | resources | origin)
         if base:
             save_weights(temporary / "checkpoints" / f"{BASE}.safetensors", base.model, epoch=0)
         try:

@@ -268,7 +268,7 @@ def test_goalkeepers_need_a_split_by_match(store: Store, config: DatasetConfig, 
 @pytest.mark.parametrize(
     ("teams", "message"),
     [
-        ((TEAM, "HELIOS_bse"), r"team 'HELIOS_bse' is in no match of the store; did you mean 'HELIOS_base'\?"),
+        ((TEAM, "HELIOS_bse"), r"team 'HELIOS_bse' is in no match of the store; did you mean HELIOS_base\?"),
         ((TEAM, TEAM), "expected different teams, got HELIOS_base, HELIOS_base; name each once"),
         ((), "expected different teams, got none"),
     ],

@@ -13,7 +13,7 @@ from teamclone.evaluation.baselines import Baselines
 from teamclone.evaluation.describe import describe, unseen_numbers
 from teamclone.evaluation.predictions import Predictions
 from teamclone.evaluation.report import listing, number, percent, points, sentences
-from teamclone.system.files import write_json
+from teamclone.system.documents import write_document
 
 MATCHES = [{"match_id": f"m{index}", "opponent": "Red" if index < 2 else "Blue"} for index in range(12)]
 BASELINES = Baselines(transitions=np.full((5, 4), 9), parameters=np.full(6, 5.0))
@@ -113,7 +113,7 @@ def test_the_same_seed_gives_the_same_document(tmp_path) -> None:
     made = outcome(n_matches=12)
     documents = [describe(made, baselines=BASELINES, matches=MATCHES, seed=seed) for seed in (1, 1, 2)]
     assert documents[0] == documents[1] != documents[2]
-    write_json(tmp_path / "a.json", documents[0])
+    write_document(tmp_path / "a.json", documents[0])
     assert json.loads((tmp_path / "a.json").read_text()) == documents[0]
 
 

@@ -94,7 +94,7 @@ def test_a_damaged_or_foreign_record_is_told_with_its_path(tmp_path: Path) -> No
     with pytest.raises(PlayError, match=r"match\.json: is damaged .* remove its folder"):
         load_record(tmp_path)
     (tmp_path / "match.json").write_text('{"format": 99}')
-    with pytest.raises(PlayError, match=r"match\.json: has format 99, expected 2"):
+    with pytest.raises(PlayError, match=r"match record of format 99, this version reads 2; choose another --out"):
         load_record(tmp_path)
 
 

@@ -15,7 +15,7 @@ from teamclone.logs import Match, columns, read_match
 from teamclone.rcss import player_types
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.store import Store, convert, schema
-from teamclone.store.status import FileStatus, Outcome
+from teamclone.store.status import FileOutcome, FileStatus
 from teamclone.store.store import Added
 
 
@@ -275,7 +275,7 @@ def test_the_status_of_files_is_kept(store: Store) -> None:
     statuses = [
         FileStatus(
             path=path,
-            outcome=Outcome.FAILED,
+            outcome=FileOutcome.FAILED,
             rows=0,
             match_id=None,
             error=f"{path}: nothing",
@@ -286,9 +286,9 @@ def test_the_status_of_files_is_kept(store: Store) -> None:
         for path in ("/logs/a.rcg", odd)
     ]
     store.save_files(statuses)
-    store.save_files([dataclasses.replace(statuses[0], outcome=Outcome.OK)])
+    store.save_files([dataclasses.replace(statuses[0], outcome=FileOutcome.OK)])
     assert store.files() == sorted(
-        [dataclasses.replace(statuses[0], outcome=Outcome.OK), statuses[1]], key=lambda status: status.path
+        [dataclasses.replace(statuses[0], outcome=FileOutcome.OK), statuses[1]], key=lambda status: status.path
     )
 
 

@@ -42,7 +42,7 @@ def test_other_formats_are_refused(filled: Path, verb: Any, number: object, reme
     assert is_store(filled)
     with pytest.raises(StoreError) as caught:
         verb(filled)
-    for part in (f"format {number}", "teamclone 9.8", f"reads format {schema.FORMAT}", remedy, str(filled)):
+    for part in (f"format {number}", "teamclone 9.8", f"this version reads {schema.FORMAT}", remedy, str(filled)):
         assert part in str(caught.value)
 
 

@@ -13,7 +13,8 @@ from postgres import DATABASE, ENCODED, OWNER, PASSWORD, Server
 from teamclone.errors import StoreError, UsageError
 from teamclone.logs import Match
 from teamclone.store import create_store, open_store, schema
-from teamclone.store.postgres import Location, PostgresStore, masked
+from teamclone.store.postgres.location import Location, masked
+from teamclone.store.postgres.store import PostgresStore
 from teamclone.store.store import Added
 
 
@@ -83,7 +84,7 @@ def test_other_servers_are_refused(url: str) -> None:
 
 
 def test_a_server_that_cannot_be_used(postgres: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("teamclone.store.postgres.FIRST_PAUSES_S", (0.01,))
+    monkeypatch.setattr("teamclone.store.postgres.connection.FIRST_PAUSES_S", (0.01,))
     for url, told, remedy in (
         (postgres.url(password="wrong%2Fpw"), "password authentication failed", "check user and password"),
         (postgres.url(user="nobody"), "authentication failed", "check user and password"),
@@ -251,7 +252,7 @@ def test_different_matches_do_not_wait_for_each_other(url: str, match: Match, mo
             inside.set()
             assert go_on.wait(60)
 
-    monkeypatch.setattr("teamclone.store.postgres._trust_keys", slow)
+    monkeypatch.setattr("teamclone.store.postgres.store._trust_keys", slow)
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(store.add, match)
         assert inside.wait(60)
@@ -272,7 +273,7 @@ def test_a_lost_connection_is_made_anew(postgres: Server, url: str, match: Match
 
 def test_a_server_that_stays_away(postgres: Server, url: str, match: Match, monkeypatch: pytest.MonkeyPatch) -> None:
     store = create_store(url)
-    monkeypatch.setattr("teamclone.store.postgres.PAUSES_S", (0.01, 0.01))
+    monkeypatch.setattr("teamclone.store.postgres.connection.PAUSES_S", (0.01, 0.01))
     postgres.stop()
     try:
         with pytest.raises(StoreError, match="Connection refused") as caught:

@@ -1,0 +1,87 @@
+"""The URL of a store in PostgreSQL: what it names, and what messages must not show of it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Self
+from urllib.parse import parse_qsl, unquote
+
+from teamclone.errors import UsageError
+
+SCHEMA = "teamclone"
+"""The schema of a URL that names none."""
+
+DEFAULTS = {
+    "connect_timeout": "10",
+    "fallback_application_name": "teamclone",
+    # A host that vanished is noticed after a minute, not after hours.
+    "keepalives_idle": "30",
+    "keepalives_interval": "10",
+    "keepalives_count": "3",
+}
+"""Settings of the connection that a URL may override."""
+
+
+class Secret(str):
+    """A URL that shows its password to nobody who only looks at it: its ``repr`` is masked, also inside others'."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return repr(masked(self))
+
+
+def masked(location: str) -> str:
+    """The URL with ``***`` for its password. Up to the last @, since a password may hold one that is not encoded."""
+    location = re.sub(r"^(\w+://[^:@/?]*):.*@", r"\1:***@", location, flags=re.DOTALL)
+    return re.sub(r"(password=)[^&]*", r"\1***", location)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Location:
+    """What a URL ``postgresql://user:password@host:port/database?schema=...`` means.
+
+    Attributes:
+        url: the URL.
+        uri: what libpq takes: without ``schema``, with ``DEFAULTS``.
+        schema: the schema that holds the tables.
+        shown: the URL for messages.
+        passwords: what messages must not show.
+    """
+
+    url: Secret
+    uri: Secret
+    schema: str
+    shown: str
+    passwords: tuple[str, ...]
+
+    @classmethod
+    def parse(cls, url: str) -> Self:
+        """
+        Raises:
+            UsageError: a part of the URL is wrong; the text does not show its password.
+        """
+        base, _, query = url.partition("?")
+        shown = masked(url)
+        authority, slash, path = base.partition("://")[2].partition("/")
+        if "@" in path or "@" in authority.rpartition("@")[0] or "#" in base or ("@" in query and "@" not in base):
+            raise UsageError(
+                f"{shown}: expected postgresql://USER:PASSWORD@HOST:PORT/DATABASE; in the password write %40 for @, "
+                "%2F for /, %3F for ?, %23 for #, or leave it to PGPASSWORD or ~/.pgpass"
+            )
+        options = dict(parse_qsl(query, keep_blank_values=True))
+        name = options.pop("schema", SCHEMA)
+        if not name or "\0" in name or name.startswith("pg_"):
+            raise UsageError(f"{shown}: schema {name!r} cannot be used, name another one with ?schema=")
+        kept = [part for part in query.split("&") if part and not part.startswith("schema=")]
+        kept += [f"{option}={value}" for option, value in DEFAULTS.items() if option not in options]
+        _, _, password = authority.rpartition("@")[0].partition(":")
+        passwords = {password, unquote(password), options.get("password", ""), options.get("sslpassword", "")}
+        return cls(
+            url=Secret(url),
+            uri=Secret(f"{base}{'' if slash else '/'}?{'&'.join(kept)}"),
+            schema=name,
+            shown=shown,
+            passwords=tuple(sorted(passwords - {""}, key=len, reverse=True)),
+        )

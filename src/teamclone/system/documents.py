@@ -1,0 +1,145 @@
+"""JSON documents with a format number: one layout, written in one step, read back with a check of the format."""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from teamclone.errors import TeamcloneError
+from teamclone.system.files import write_atomic
+
+
+def write_document(path: Path, document: dict[str, Any]) -> None:
+    """Write a document so that a reader sees the old one or the new one."""
+    write_atomic(path, document_bytes(document))
+
+
+def document_bytes(document: dict[str, Any]) -> bytes:
+    """Lay a document out: objects over many lines, lists on one, so that it is readable and a diff shows what changed.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    return f"{_layout(document)}\n".encode()
+
+
+def _layout(value: Any, indent: str = "") -> str:
+    if not isinstance(value, dict) or not value:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False, default=str)
+    if set(value) == {"value", "low", "high"}:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    inner = indent + " "
+    lines = [
+        f"{inner}{json.dumps(str(key), ensure_ascii=False)}: {_layout(item, inner)}" for key, item in value.items()
+    ]
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def read_document(
+    path: Path,
+    *,
+    what: str,
+    number: int,
+    command: str,
+    error: type[TeamcloneError],
+    folder: Path | None = None,
+    again: str | None = None,
+) -> dict[str, Any]:
+    """Read a document of an expected format.
+
+    Args:
+        what: what it is or describes, with its article: ``a run``.
+        number: the format that the caller reads.
+        command: what makes such a document: ``teamclone train``.
+        error: the class of what is raised.
+        folder: the folder that the document describes, which the messages then name; None for a document of its own.
+        again: what to do about another format; None for giving ``command`` again.
+
+    Raises:
+        error: the document is missing, is none, or has another format number.
+    """
+    again = again or f"make it again with `{command}`"
+    try:
+        document: dict[str, Any] = json.loads(path.read_bytes())
+        found = document["format"]
+    except (FileNotFoundError, NotADirectoryError):
+        if folder is None:
+            raise error(f"{path}: missing; make it with `{command}`") from None
+        problem = f"not {what}, it has no {path.name}" if folder.exists() else "no such folder"
+        raise error(f"{folder}: {problem}; make one with `{command}`") from None
+    except (ValueError, TypeError, KeyError) as problem:
+        raise error(not_a_document(path, what if folder is None else f"the description of {what}", problem)) from None
+    check_format(found, number=number, what=what.partition(" ")[2], where=folder or path, again=again, error=error)
+    return document
+
+
+def not_a_document(path: Path, what: str, problem: Exception) -> str:
+    """Say that a file is not what it should be: ``run/environment.json: not the description of a run (...)``."""
+    return f"{path}: not {what} ({problem!r})"
+
+
+def check_format(
+    found: object,
+    *,
+    number: int,
+    what: str,
+    where: Path | str,
+    again: str,
+    error: type[TeamcloneError],
+    writer: object = None,
+) -> None:
+    """Refuse another format number.
+
+    Args:
+        found: the format number that was read.
+        number: the one that this version reads.
+        what: the kind of the document, without an article.
+        where: its place.
+        again: what to do.
+        error: the class of what is raised.
+        writer: the version of teamclone that wrote it; None where that is not known.
+
+    Raises:
+        error: the numbers differ.
+    """
+    if found != number:
+        by = "" if writer is None else f", written by teamclone {writer}"
+        raise error(f"{where}: {what} of format {found}{by}, this version reads {number}; {again}")
+
+
+@contextmanager
+def write_errors(
+    where: Path,
+    *,
+    error: type[TeamcloneError],
+    full: str,
+    denied: str,
+    kinds: tuple[type[Exception], ...] = (OSError,),
+) -> Iterator[None]:
+    """Turn the system's refusal to write into one clear line.
+
+    Args:
+        where: the folder that is written to.
+        error: the class of what is raised.
+        full: what to do when the disk is full.
+        denied: what to do when it cannot be written for another reason.
+        kinds: the exceptions that are turned.
+    """
+    try:
+        yield
+    except kinds as problem:
+        if getattr(problem, "errno", None) in (errno.ENOSPC, errno.EDQUOT) or "No space left" in str(problem):
+            text = f"the disk is full; {full}"
+        else:
+            reason = getattr(problem, "strerror", None) or first_line(problem)
+            text = f"cannot be written ({reason}); {denied}"
+        raise error(f"{where}: {text}") from problem
+
+
+def first_line(problem: Exception) -> str:
+    """Return the first line of an exception's text, or its class where it has none."""
+    return str(problem).splitlines()[0] if str(problem) else type(problem).__name__

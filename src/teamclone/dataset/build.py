@@ -50,8 +50,8 @@ class DatasetConfig:
         split: see SplitBy.
         commands, turn_zero: see `clean`.
         train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. Teams now and
-            then give the goalkeeper another number: who then plays in the field with his number may well play as he
-            does, and a network that knows players by their numbers has otherwise never seen him.
+            then give the goalkeeper another number: the field player with the old one may well play as the goalkeeper
+            does, and a network that knows players by their numbers has otherwise never seen that number.
         goalkeepers: model goalkeepers as everybody else, in every split, and ``catch`` as a command.
         set_plays: take the commands of all play modes that have a Situation, not only of play_on, and ``move`` as one.
         idle: take cycles without a body command as samples of ``none``.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,6 +39,7 @@ class LoadedClone:
         team: str | None = None,
         side: str | None = None,
         store: Store | None = None,
+        unums: Collection[int] | None = None,
         goalkeepers: bool = False,
         on_progress: Callable[[int, int], None] | None = None,
     ) -> PredictionTable:
@@ -49,6 +50,7 @@ class LoadedClone:
                 of a match of it. Without a command log the columns of what was done are null.
             team: name of the team, the modelled one or any other. side: "left" or "right", in its place.
             store: where ``match`` is an id.
+            unums: uniform numbers to predict, 1 to 11; None for all.
             goalkeepers: predict goalkeepers even if the clone does not know catch.
             on_progress: called with the rows done and their number.
 
@@ -63,6 +65,7 @@ class LoadedClone:
             self.model,
             columns,
             side=columns.side_of(team, side),
+            unums=unums,
             goalkeepers=goalkeepers,
             on_progress=on_progress,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from torch import Tensor
 
 from teamclone.dataset.clean import COMMAND_COLUMNS, Commands, clean_match, players_to_model
 from teamclone.errors import DatasetError, TeamcloneError, UsageError, choose
-from teamclone.evaluation.answers import answers
+from teamclone.evaluation.answers import Answers, answers
 from teamclone.logs.match import Columns, Match
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
@@ -143,6 +143,7 @@ def predict_match(
     match: MatchColumns,
     *,
     side: int,
+    unums: Collection[int] | None = None,
     goalkeepers: bool = False,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> PredictionTable:
@@ -155,6 +156,7 @@ def predict_match(
         model: the clone.
         match: its columns.
         side: of the team, 1 left or -1 right.
+        unums: uniform numbers to predict, 1 to 11; None for all.
         goalkeepers: predict goalkeepers of a model without catch, too.
         on_progress: called with the rows done and their number.
 
@@ -163,6 +165,8 @@ def predict_match(
     """
     commands = model.config.commands
     due = players_to_model(match.frames, match.players, side=side, repertoire=commands, goalkeepers=goalkeepers)
+    if unums is not None:
+        due &= np.isin(np.arange(1, N_TEAM + 1), list(unums))
     frame, actor = np.nonzero(due)
     world = view_columns(match.frames, match.players, types=match.types, params=match.params, side=side)
     _check(match, world.players, world.ball, frame, model.inputs.channels)
@@ -188,11 +192,29 @@ def predict_match(
         probabilities[part], likeliest[part], parameter_log_loss[part] = answer
         if on_progress is not None:
             on_progress(part.stop, len(frame))
+    answer = Answers(probabilities, likeliest, parameter_log_loss)
+    table = _table(match, frame, actor, answer, done, asked=near | done.with_ball, side=side, commands=commands)
+    return PredictionTable(table)
+
+
+def _table(
+    match: MatchColumns,
+    frame: NDArray[np.int64],
+    actor: NDArray[np.int64],
+    answer: Answers,
+    done: _Done,
+    *,
+    asked: NDArray[np.bool_],
+    side: int,
+    commands: tuple[str, ...],
+) -> pa.Table:
+    """Return the columns of `PredictionTable`; ``asked`` (n,) says whose kicks and tackles were predicted."""
+    probabilities, likeliest, parameter_log_loss = answer
+    parameters = parameters_of(commands)
     unknown = done.kind < 0
     parameter_log_loss[unknown | np.isnan(done.issued).all(1)] = np.nan
     with np.errstate(divide="ignore"):
         log_loss = -np.log(np.take_along_axis(probabilities, done.kind.clip(min=0)[:, None], 1)[:, 0])
-    asked = near | done.with_ball
     for column, parameter in enumerate(parameters):
         if parameter.kind.name in {"KICK", "TACKLE"}:
             likeliest[~asked, column] = np.nan
@@ -216,7 +238,7 @@ def predict_match(
         "log_loss": _or_null(np.where(unknown, np.nan, log_loss)),
         "parameter_log_loss": _or_null(parameter_log_loss),
     }
-    return PredictionTable(pa.table(columns))
+    return pa.table(columns)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from teamclone.models.inputs.reach import (
     kickable_area,
     reach_ball,
 )
-from teamclone.planner.plan import plans
+from teamclone.models.inputs.planned import plans
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD, FLAG_TACKLING

@@ -49,11 +49,10 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
 ARROWS_FOR_NOW = {
     "evaluation.evaluate -> teamclone",
     "evaluation.latency -> teamclone",
-    "planner.plan -> world.state",
 }
 
 MAY_IMPORT_TORCH = ("world.state", "world.mirror", "dataset.reader", "models", "training", "search", "evaluation")
-TORCH_FOR_NOW = {"planner.plan"}
+TORCH_FOR_NOW: set[str] = set()
 
 MOST_LINES = 80
 TOO_LONG_FOR_NOW = {

@@ -15,6 +15,8 @@ from teamclone.planner.scene import (
     ROLL,
     SERVER,
     TOUCH,
+    VX,
+    VY,
     Array,
     X,
     Y,
@@ -57,10 +59,10 @@ def cycles_over(metres: float, speed: float, decay: float) -> int:
 
 @kernel
 def kick_rate(player: Array, metres: float, aside: float) -> float:
-    """Return the speed that a unit of power gives a ball so far from the player's centre; `dynamics.formulas.kick_rate`.
+    """Return the speed that a unit of power gives a ball so far off; `dynamics.formulas.kick_rate`.
 
     Args:
-        aside: degrees between the body and the ball.
+        metres: from the player's centre to the ball's. aside: degrees between the body and the ball.
     """
     off = abs(turned(aside)) / 180.0
     return player[KICK_RATE] * (1.0 - 0.25 * off - 0.25 * (metres - player[TOUCH]) / player[MARGIN])
@@ -73,13 +75,17 @@ def most_acceleration(server: Array, gain: float) -> float:
 
 
 @kernel
-def fastest(server: Array, cos: float, sin: float, gain: float, vx: float, vy: float) -> float:
+def fastest(limits: tuple[float, float], toward: tuple[float, float], velocity: tuple[float, float]) -> float:
     """Return the greatest speed in a direction that one kick gives a ball with this velocity; 0 if it cannot go there.
 
     Velocities after a kick fill a disc around the velocity before: the speed is that where the ray leaves the disc.
+
+    Args:
+        limits: by how much the kick changes the velocity at most, and the ball's speed at most. toward: unit vector.
     """
-    radius, limit = most_acceleration(server, gain), server[BALL_SPEED_MAX]
-    middle, off = vx * cos + vy * sin, vy * cos - vx * sin
+    radius, limit = limits
+    middle = velocity[0] * toward[0] + velocity[1] * toward[1]
+    off = velocity[1] * toward[0] - velocity[0] * toward[1]
     if abs(off) > radius:
         return 0.0
     half = math.sqrt(radius * radius - off * off)
@@ -89,6 +95,12 @@ def fastest(server: Array, cos: float, sin: float, gain: float, vx: float, vy: f
 
 
 @kernel
+def kick_limits(server: Array, gain: float) -> tuple[float, float]:
+    """Return the limits of `fastest` where a unit of kick power gives the ball so much speed."""
+    return most_acceleration(server, gain), server[BALL_SPEED_MAX]
+
+
+@kernel
 def fastest_from(scene: Array, cos: float, sin: float, gain: float) -> float:
     """Return `fastest` of the ball of a scene."""
-    return fastest(scene[SERVER], cos, sin, gain, scene[BALL, 2], scene[BALL, 3])
+    return fastest(kick_limits(scene[SERVER], gain), (cos, sin), (scene[BALL, VX], scene[BALL, VY]))

@@ -11,12 +11,12 @@ from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.motion import S_X, S_Y, dash, drift, motion_of, spare
 from teamclone.planner.players import DRIBBLE, HARDLY_M, arrival
 from teamclone.planner.scene import (
+    ACTOR,
     AWAY,
     BALL,
     BALL_DECAY,
     BALL_SPEED_MAX,
     BODY,
-    ACTOR,
     DECAY,
     GAIN,
     GOAL_X,
@@ -77,9 +77,9 @@ def _hindered(scene: Array, place: tuple[float, float], cycles: int) -> bool:
     for opponent in range(OPPONENT, BALL):
         player = scene[opponent]
         ahead, _ = along(player[X] - ball[X], player[Y] - ball[Y], cos, sin)
-        if player[AWAY] <= SEEN_M and ahead >= DRIBBLE.behind_m:
-            if arrival(scene, player, place, cycles, DRIBBLE) <= cycles:
-                return True
+        seen = player[AWAY] <= SEEN_M and ahead >= DRIBBLE.behind_m
+        if seen and arrival(scene, player, place, cycles, DRIBBLE) <= cycles:
+            return True
     return False
 
 
@@ -131,7 +131,9 @@ def best_dribble(scene: Array) -> Array:
                 continue
             speed = speed_over(metres, cycles, server[BALL_DECAY])
             vx, vy = speed * (x - ball[X]) / metres, speed * (y - ball[Y]) / metres
-            if speed > server[BALL_SPEED_MAX] or gap(vx, vy, ball[VX], ball[VY]) > most_acceleration(server, ball[GAIN]):
+            if speed > server[BALL_SPEED_MAX] or gap(vx, vy, ball[VX], ball[VY]) > most_acceleration(
+                server, ball[GAIN]
+            ):
                 continue
             value = evaluate(scene, x, y, True)
             if value <= best[VALUE] or not passes_actor(scene, ball[X] + vx, ball[Y] + vy):

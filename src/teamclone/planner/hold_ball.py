@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from teamclone.planner.ball import kick_rate
-from teamclone.planner.players import after_dash, reach_of, seen_from, tackle_chance
+from teamclone.planner.players import reach_of, seen_from, tackle_chance
 from teamclone.planner.scene import (
     ACTOR,
     AREA,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.planner.ball import fastest, kick_rate, most_acceleration
+from teamclone.planner.ball import fastest, fastest_from, kick_limits, kick_rate, most_acceleration
 from teamclone.planner.hold_ball import kick_noise
 from teamclone.planner.players import after_dash, reach_of, seen_from, tackle_chance
 from teamclone.planner.scene import (
@@ -46,7 +46,7 @@ from teamclone.planner.scene import (
     turned,
 )
 from teamclone.rcss.player_types import DEFAULTS
-from teamclone.rcss.server_params import SERVER_DEFAULTS, default
+from teamclone.rcss.server_params import default
 
 RINGS, COUNTS = (0.3, 0.5, 0.7), (12, 15, 20)
 """Places around the body: parts of the margin, and how many on each ring."""
@@ -77,7 +77,8 @@ def kick_order() -> NDArray[np.int64]:
     default type, the pairs first that give the ball most speed."""
     size, margin = DEFAULTS["player_size"] + default("ball_size"), DEFAULTS["kickable_margin"]
     thin = margin - 0.1  # the smallest that the server gives
-    places, rates, server = [], [], SERVER_DEFAULTS.tolist()
+    places, rates = [], []
+    power_max, accel_max, speed_max = (default(name) for name in ("maxpower", "ball_accel_max", "ball_speed_max"))
     for part, count in zip(RINGS, COUNTS, strict=True):
         radius = min(max(size + OFF_M, size + thin * part), size + margin - WITHIN_M)
         for place in range(count):
@@ -100,7 +101,7 @@ def kick_order() -> NDArray[np.int64]:
         for first, (from_x, from_y) in enumerate(places):
             for second, (to_x, to_y) in enumerate(places):
                 vx, vy = to_x - from_x, to_y - from_y
-                speed = fastest.py_func(server, cos, sin, rates[second], vx, vy)
+                speed = fastest.py_func((min(power_max * rates[second], accel_max), speed_max), (cos, sin), (vx, vy))
                 power = math.hypot(speed * cos - vx, speed * sin - vy) / rates[second]
                 pairs.append((speed, power, first, second))
         pairs.sort(key=functools.cmp_to_key(order))
@@ -163,9 +164,9 @@ def _danger(server: Array, player: Array, place: tuple[float, float], cycles: in
     between = abs(ahead) < dash_m and abs(aside) < reach
     if between or after_dash(ahead, aside, dash_m) < reach - of.short_m:
         found |= of.dashed
-    elif abs(aside) < TACKLE_PART * server[TACKLE_WIDTH] and (of.behind or ahead > 0.0):
-        if ahead < dash_m + server[TACKLE_DIST] - of.tackle_m:
-            found |= of.dash_tackled
+    else:
+        near = ahead < dash_m + server[TACKLE_DIST] - of.tackle_m and (of.behind or ahead > 0.0)
+        found |= of.dash_tackled if near and abs(aside) < TACKLE_PART * server[TACKLE_WIDTH] else 0
     return found
 
 
@@ -253,7 +254,7 @@ def best_sequence(scene: Array, order: NDArray[np.int64], target: Target, most: 
         cos, sin = (to_x - ball[X]) / metres, (to_y - ball[Y]) / metres
         speed = wanted
         if math.hypot(wanted * cos - ball[VX], wanted * sin - ball[VY]) > most_added:
-            speed = fastest(server, cos, sin, gain, ball[VX], ball[VY])
+            speed = fastest_from(scene, cos, sin, gain)
         speeds[0], powers[0] = speed, math.hypot(speed * cos - ball[VX], speed * sin - ball[VY]) / gain
         velocity[0, 0], velocity[0, 1], kicks[0], threats[0] = speed * cos, speed * sin, 1, begun
         count = 1
@@ -299,7 +300,7 @@ def best_sequence(scene: Array, order: NDArray[np.int64], target: Target, most: 
                 speed = wanted
                 where = count
                 if math.hypot(wanted * cos - to_vx, wanted * sin - to_vy) > most_acceleration(server, rate[last]):
-                    speed = fastest(server, cos, sin, rate[last], to_vx, to_vy)
+                    speed = fastest(kick_limits(server, rate[last]), (cos, sin), (to_vx, to_vy))
                     if (done and stage == 3) or speed <= fastest_so_far:
                         continue
                     # Of those that fall short one is kept; it takes the place of what was found last.

@@ -168,7 +168,7 @@ def _receivers(scene: Array, actor: int) -> None:
 
 @kernel
 def _compare(values: Array, made: Array) -> int:
-    """Fill by how much each value is beyond the best of the others, and return the index of the best, the last first."""
+    """Fill by how much each value is beyond the best of the others, and return the index of the best."""
     best = len(values) - 1
     for index in range(len(values)):
         if values[index] > values[best]:

@@ -29,8 +29,8 @@ A player who is not on the field is far away."""
 """Columns of a player. FROZEN: is tackling; TOUCH: metres between the centres of player and ball that touch; MARGIN: by
 how much farther the player can kick it; AREA: both; CATCH: metres to which a goalkeeper catches in its penalty area.
 DASH_ACCEL: metres per cycle that a dash at full power adds; TOP: speed that such dashes lead to; LAG: by how many
-cycles a player that starts from rest is behind one at that speed. AWAY: metres from the actor. RECEIVES: may get a pass.
-From TURN on: degrees that 1, 2, ... turns turn the player."""
+cycles a player that starts from rest is behind one at that speed. AWAY: metres from the actor. RECEIVES: may get a
+pass. From TURN on: degrees that 1, 2, ... turns turn the player."""
 TURNS = 8
 """Turns of which the degrees are kept."""
 ROLL = TURN + TURNS

@@ -9,7 +9,7 @@ import numpy as np
 from teamclone.planner.ball import Path, ball_after, fastest_from, speed_over
 from teamclone.planner.dribble import DIRECTION, SPEED, VALUE, nothing, passes_actor
 from teamclone.planner.field_evaluator import evaluate
-from teamclone.planner.motion import S_CAPACITY, S_STAMINA, S_X, S_Y, dash, drift, motion_of, spare
+from teamclone.planner.motion import S_X, S_Y, dash, drift, motion_of, spare
 from teamclone.planner.players import (
     SELF_PASS,
     SELF_PASS_AHEAD,

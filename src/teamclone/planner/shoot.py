@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after, cycles_over, fastest_from
 from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, arrival, first_cycle
 from teamclone.planner.scene import (
@@ -54,9 +52,9 @@ NEAR_VALUE, ONE_KICK_VALUE = 100.0, 50.0
 
 @kernel
 def _lateness(scene: Array, path: Path, last: int) -> tuple[int, int]:
-    """Return by how many cycles the goalkeeper and the others miss a shot that is in the goal after ``last``, the least.
+    """Return by how many cycles the goalkeeper and the others miss a shot that is in the goal after ``last``.
 
-    0 or less of one that saves it.
+    The least of them all; 0 or less if one saves it.
     """
     me = scene[ACTOR]
     goalkeeper, others = NEVER_CYCLES, NEVER_CYCLES

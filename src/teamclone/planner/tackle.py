@@ -10,7 +10,6 @@ from teamclone.planner.players import (
     TACKLE,
     first_cycle,
     intercept,
-    seen_from,
     tackle_chance,
 )
 from teamclone.planner.scene import (

@@ -32,7 +32,7 @@ from typing import Any
 import fidelity_page
 import numpy as np
 import torch
-from kicks import kicked
+from kicks import EXACT, EXACT_DEG, as_planned, kicked, tackles_as_planned
 from measure import cost_of
 from numpy.typing import NDArray
 
@@ -49,8 +49,9 @@ from teamclone.evaluation.predictions import Predictions
 from teamclone.models.clone import parameter_count
 from teamclone.models.config import BLOCKS
 from teamclone.models.inputs.egocentric import EgocentricFeatures
+from teamclone.models.inputs.planned import plans
 from teamclone.models.inputs.reach import kickable_area, reach_ball
-from teamclone.planner.plan import CHOICES, KICK_OF, PLAN, WAYS, plans
+from teamclone.planner.plan import CHOICES
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.system.documents import write_document
 from teamclone.system.machine import processor
@@ -543,13 +544,8 @@ class Work:
         rows, made, given = self._with_ball()
         kinds = self.dataset.samples["kind"].numpy()[rows]
         kicked = kinds == CLONED.index("kick")
-        ways = made[:, PLAN.index("shot_vx") :].reshape(-1, len(WAYS), 2)
-        there = made[:, PLAN.index("shot_there") :][:, : len(WAYS)] > 0
-        exact = (np.hypot(*np.moveaxis(ways - given[:, None], 2, 0)) < EXACT) & there
-        choice = made[:, 1 : 1 + len(CHOICES)].argmax(1)
-        way = np.array([WAYS.index(KICK_OF[name]) if name in KICK_OF else 0 for name in CHOICES])[choice]
-        kicks = np.array([name in KICK_OF for name in CHOICES])[choice]
-        as_planned = kicked & kicks & exact[np.arange(len(rows)), way]
+        exact, chosen, choice = as_planned(made, given)
+        followed = kicked & chosen
         of_clone = self._kicks_of_clone(rows[kicked])
         right = np.zeros(len(rows), np.bool_)
         right[kicked] = np.hypot(*(of_clone - given[kicked]).T) < EXACT
@@ -557,7 +553,7 @@ class Work:
         found = {
             name: {
                 "kicks": int((mask & kicked).sum()),
-                "as_planned": _share(as_planned[mask & kicked]),
+                "as_planned": _share(followed[mask & kicked]),
                 "among": _share(exact.any(1)[mask & kicked]),
                 "clone": _share(right[mask & kicked]),
             }
@@ -566,8 +562,8 @@ class Work:
         choices = {}
         for index, name in enumerate(CHOICES):
             here = choice == index
-            other = here & kicked & ~as_planned
-            does = {"as_planned": as_planned & here, "other_kick": other}
+            other = here & kicked & ~followed
+            does = {"as_planned": followed & here, "other_kick": other}
             does |= {kind: here & (kinds == CLONED.index(kind)) for kind in ("dash", "turn", "tackle")}
             choices[name] = {"rows": int(here.sum()), **{what: _share(part[here]) for what, part in does.items()}}
         return found, choices
@@ -576,7 +572,6 @@ class Work:
         """By set, how many tackles go where it is planned, and where `best-0` says."""
         rows = self.rows[self.dataset.samples["kind"].numpy()[self.rows] == CLONED.index("tackle")]
         planned = plans(self.dataset.state(rows)).numpy()
-        there, degrees = (planned[:, PLAN.index(f"tackle_{name}")] for name in ("there", "degrees"))
         outcome = predict(open_run(self.out / "runs" / "best-0").load_model(), self.dataset, rows)
         place = [item.name for item in PARAMETERS].index("tackle_direction")
 
@@ -585,11 +580,12 @@ class Work:
             found: NDArray[np.bool_] = np.abs((away + 180.0) % 360.0 - 180.0) < EXACT_DEG
             return found
 
-        as_planned, of_clone = right(degrees) & (there > 0), right(outcome.parameters[:, place])
+        followed = tackles_as_planned(planned, outcome.issued[:, place])
+        of_clone = right(outcome.parameters[:, place])
         return {
             name: {
                 "tackles": int(here.sum()),
-                "as_planned": _share(as_planned[here]),
+                "as_planned": _share(followed[here]),
                 "clone": _share(of_clone[here]),
             }
             for name, here in ((name, np.isin(rows, self.rows[mask])) for name, mask in self.sets.items())
@@ -639,12 +635,6 @@ def _whole(settings: dict[str, Any]) -> dict[str, Any]:
 
 def chunks(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
     return (rows[start : start + CHUNK] for start in range(0, len(rows), CHUNK))
-
-
-EXACT = 0.004
-"""Metres per cycle by which the velocity of the ball after a kick may miss what was planned; logs have four digits."""
-EXACT_DEG = 1.0
-"""The same of a tackle's direction; HELIOS Base chooses among 40, nine degrees apart."""
 
 
 SITUATIONS = ("ball kickable", "first of the team to the ball", "off the ball")

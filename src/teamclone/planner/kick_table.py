@@ -9,47 +9,44 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.planner.constants import BALL_DECAY, BALL_SIZE
-from teamclone.planner.hold_ball import blur
-from teamclone.planner.players import (
+from teamclone.planner.ball import fastest, fastest_from, kick_limits, kick_rate, most_acceleration
+from teamclone.planner.hold_ball import kick_noise
+from teamclone.planner.players import after_dash, reach_of, seen_from, tackle_chance
+from teamclone.planner.scene import (
+    ACTOR,
     AREA,
     BALL,
-    BALL_PUSH_MAX,
+    BALL_DECAY,
     BALL_RAND,
     BODY,
+    DASH_ACCEL,
     FOUL_EXPONENT,
+    FROZEN,
     GAIN,
     GOAL_X,
-    KICK_RAND,
+    LINE_Y,
     MARGIN,
-    ME,
+    MAX_POWER,
     OPPONENT,
     PLAYER_RAND,
-    PUSH,
-    SIZE,
+    SERVER,
+    TACKLE_DIST,
     TACKLE_EXPONENT,
-    TACKLE_M,
-    TACKLE_WIDTH_M,
-    TACKLING,
+    TACKLE_WIDTH,
+    TOUCH,
     VX,
     VY,
     Array,
     X,
     Y,
-    beside,
-    coasted,
     direction,
-    fastest,
     gap,
-    in_their_box,
+    inertia_point,
     kernel,
-    kick_rate,
-    reach_of,
-    tackle_chance,
     turned,
 )
-from teamclone.rcss import pitch
 from teamclone.rcss.player_types import DEFAULTS
+from teamclone.rcss.server_params import default
 
 RINGS, COUNTS = (0.3, 0.5, 0.7), (12, 15, 20)
 """Places around the body: parts of the margin, and how many on each ring."""
@@ -70,19 +67,18 @@ the ball may be cut off."""
 RISKS = TACKLED | SOON_TACKLED | SOON_LOST | MAYBE_CUT_OFF | MISSED
 NEAR_M = 10.0
 """Opponents further from the ball are not looked at."""
-SURE = 0.7, 0.8
-"""Chances from which on a tackle counts: of a ball that lies, and of one that is kicked on."""
 ENOUGH = 10
 """Paths of three kicks after which no more are looked for."""
 MOST = 2 * (PLACES + PATHS) + 1
 
 
-def paths() -> NDArray[np.int64]:
+def kick_order() -> NDArray[np.int64]:
     """(DIRECTIONS, PATHS, 2) first and second place before a kick in each direction from the body, for a player of the
     default type, the pairs first that give the ball most speed."""
-    size, margin = DEFAULTS["player_size"] + BALL_SIZE, DEFAULTS["kickable_margin"]
+    size, margin = DEFAULTS["player_size"] + default("ball_size"), DEFAULTS["kickable_margin"]
     thin = margin - 0.1  # the smallest that the server gives
     places, rates = [], []
+    power_max, accel_max, speed_max = (default(name) for name in ("maxpower", "ball_accel_max", "ball_speed_max"))
     for part, count in zip(RINGS, COUNTS, strict=True):
         radius = min(max(size + OFF_M, size + thin * part), size + margin - WITHIN_M)
         for place in range(count):
@@ -105,7 +101,7 @@ def paths() -> NDArray[np.int64]:
         for first, (from_x, from_y) in enumerate(places):
             for second, (to_x, to_y) in enumerate(places):
                 vx, vy = to_x - from_x, to_y - from_y
-                speed = fastest.py_func(cos, sin, rates[second], vx, vy)
+                speed = fastest.py_func((min(power_max * rates[second], accel_max), speed_max), (cos, sin), (vx, vy))
                 power = math.hypot(speed * cos - vx, speed * sin - vy) / rates[second]
                 pairs.append((speed, power, first, second))
         pairs.sort(key=functools.cmp_to_key(order))
@@ -113,7 +109,7 @@ def paths() -> NDArray[np.int64]:
     return made
 
 
-class Wish(NamedTuple):
+class Target(NamedTuple):
     """Where the ball is to go, with what speed, and above which one it will do."""
 
     x: float
@@ -122,67 +118,75 @@ class Wish(NamedTuple):
     enough: float
 
 
-@kernel
-def _after_a_dash(ahead: float, aside: float, push: float, reach: float) -> bool:
-    """Whether he can kick it after a dash ahead or back."""
-    return math.hypot(ahead + push, aside) < reach or math.hypot(ahead - push, aside) < reach
+class Danger(NamedTuple):
+    """When an opponent endangers a ball, and what that is called.
+
+    Attributes:
+        touch_m: metres beyond its reach within which an opponent that drifts has the ball.
+        chance: of its tackle, from which on it counts; exponent: column of the server that the tackle goes by.
+        dash: part of its dash that counts; short_m: metres by which it reaches less after a dash.
+        tackle_m: metres by which its tackle after a dash reaches less; behind: whether such a tackle goes back, too.
+        taken, tackled, dashed, dash_tackled: what is found.
+    """
+
+    touch_m: float
+    chance: float
+    exponent: int
+    dash: float
+    short_m: float
+    tackle_m: float
+    behind: bool
+    taken: int
+    tackled: int
+    dashed: int
+    dash_tackled: int
+
+
+LIES = Danger(0.15, 0.7, FOUL_EXPONENT, 1.0, 0.0, 0.3, False, LOST, TACKLED, SOON_LOST, SOON_TACKLED)
+KICKED_ON = Danger(0.1, 0.8, TACKLE_EXPONENT, 0.8, 0.15, 0.5, True, CUT_OFF, *[MAYBE_CUT_OFF] * 3)
+TACKLE_PART = 0.7
+"""Part of the width of a tackle that counts after a dash."""
 
 
 @kernel
-def _dangers(scene: Array, x: float, y: float) -> int:
-    """Of a ball that lies in a place."""
+def _danger(server: Array, player: Array, place: tuple[float, float], cycles: int, of: Danger) -> int:
+    """Return what one opponent does to a ball that is in a place after so many cycles."""
+    ahead, aside = seen_from(player, place, cycles)
+    away = math.hypot(ahead, aside)
+    if player[FROZEN] > 0:
+        return of.taken if away < player[TOUCH] else 0
+    reach, dash_m = reach_of(player, place[0], place[1]), of.dash * player[DASH_ACCEL]
+    if away < reach + of.touch_m:
+        return of.taken
     found = 0
-    for opponent in range(OPPONENT, BALL):
-        player = scene[opponent]
-        if gap(player[X], player[Y], scene[BALL, 0], scene[BALL, 1]) > NEAR_M:
-            continue
-        at_x, at_y = player[X] + player[VX], player[Y] + player[VY]
-        away = math.hypot(x - at_x, y - at_y)
-        if player[TACKLING] > 0:
-            if away < player[SIZE]:
-                return found | LOST
-            continue
-        reach = reach_of(player, x, y) if in_their_box(player[X], player[Y]) else player[AREA]
-        if away < reach + 0.15:
-            return found | LOST
-        ahead, aside = beside(player, (at_x, at_y), x, y)
-        if tackle_chance(ahead, aside, FOUL_EXPONENT) > SURE[0]:
-            found |= TACKLED
-        push = player[PUSH]
-        if abs(aside) < reach and (abs(ahead) < push or _after_a_dash(ahead, aside, push, reach)):
-            found |= SOON_LOST
-        elif abs(aside) < 0.7 * TACKLE_WIDTH_M and 0.0 < ahead < push + TACKLE_M - 0.3:
-            found |= SOON_TACKLED
+    if tackle_chance(server, ahead, aside, server[of.exponent]) > of.chance:
+        found |= of.tackled
+    between = abs(ahead) < dash_m and abs(aside) < reach
+    if between or after_dash(ahead, aside, dash_m) < reach - of.short_m:
+        found |= of.dashed
+    else:
+        near = ahead < dash_m + server[TACKLE_DIST] - of.tackle_m and (of.behind or ahead > 0.0)
+        found |= of.dash_tackled if near and abs(aside) < TACKLE_PART * server[TACKLE_WIDTH] else 0
     return found
 
 
 @kernel
-def _dangers_after(scene: Array, x: float, y: float, wish: Wish, cycles: int) -> int:
-    """Of a ball that is kicked on from a place, in so many cycles."""
+def _dangers(scene: Array, place: tuple[float, float], cycles: int, of: Danger) -> int:
+    """Return what all opponents near the ball may do to it."""
     found = 0
-    metres = gap(wish.x, wish.y, x, y)
-    x, y = x + wish.speed * (wish.x - x) / metres, y + wish.speed * (wish.y - y) / metres
     for opponent in range(OPPONENT, BALL):
         player = scene[opponent]
-        if gap(player[X], player[Y], scene[BALL, 0], scene[BALL, 1]) > NEAR_M:
-            continue
-        at_x, at_y = coasted(player, cycles)
-        away = math.hypot(x - at_x, y - at_y)
-        if player[TACKLING] > 0:
-            if away < player[SIZE]:
-                found |= CUT_OFF
-            continue
-        reach = reach_of(player, x, y) if in_their_box(at_x, at_y) else player[AREA]
-        if away < reach + 0.1:
-            found |= CUT_OFF
-            continue
-        ahead, aside = beside(player, (at_x, at_y), x, y)
-        push = 0.8 * player[PUSH]
-        near = abs(aside) < reach and (abs(ahead) < push or _after_a_dash(ahead, aside, push, reach - 0.15))
-        tackles = abs(aside) < 0.7 * TACKLE_WIDTH_M and ahead - push < TACKLE_M - 0.5
-        if near or tackles or tackle_chance(ahead, aside, TACKLE_EXPONENT) > SURE[1]:
-            found |= MAYBE_CUT_OFF
+        if gap(player[X], player[Y], scene[BALL, X], scene[BALL, Y]) <= NEAR_M:
+            found |= _danger(scene[SERVER], player, place, cycles, of)
     return found
+
+
+@kernel
+def _kicked_on(place: tuple[float, float], target: Target) -> tuple[float, float]:
+    """Return where a ball is one cycle after it is kicked on from a place."""
+    metres = gap(target.x, target.y, place[0], place[1])
+    way = target.speed / metres
+    return place[0] + way * (target.x - place[0]), place[1] + way * (target.y - place[1])
 
 
 @kernel
@@ -190,23 +194,23 @@ def _places(me: Array, radius: Array, rate: Array, place: Array) -> None:
     """Fill the places beside him in the next two cycles (2, PLACES, 2), how far off and what a kick there gives."""
     index = 0
     for ring in range(len(RINGS)):
-        off = min(max(me[SIZE] + OFF_M, me[SIZE] + me[MARGIN] * RINGS[ring]), me[AREA] - WITHIN_M)
+        off = min(max(me[TOUCH] + OFF_M, me[TOUCH] + me[MARGIN] * RINGS[ring]), me[AREA] - WITHIN_M)
         for turn in range(COUNTS[ring]):
             degrees = 360.0 / COUNTS[ring] * turn - 180.0
             angle = math.radians(degrees + me[BODY])
             radius[index], rate[index] = off, kick_rate(me, off, degrees)
             for cycle in range(2):
-                x, y = coasted(me, cycle + 1)
+                x, y = inertia_point(me, cycle + 1)
                 place[cycle, index, 0], place[cycle, index, 1] = x + off * math.cos(angle), y + off * math.sin(angle)
             index += 1
 
 
 @kernel
-def _judged(wish: Wish, speed: float, power: float, kicks: int, dangers: int) -> float:
+def _judged(target: Target, speed: float, power: float, kicks: int, dangers: int) -> float:
     """How good a sequence of kicks is, 1 for the best: PRICES of what may happen, of each kick more, and of its last
     one's power."""
-    short = wish.speed - speed
-    if short > 0 and (kicks > 1 or speed < wish.enough):
+    short = target.speed - speed
+    if short > 0 and (kicks > 1 or speed < target.enough):
         value = TOO_SLOW - SLOWER * short
     else:
         value = 1.0 - (SHORT if short > 0 else 0.0)
@@ -220,46 +224,45 @@ def _judged(wish: Wish, speed: float, power: float, kicks: int, dangers: int) ->
 
 
 @kernel
-def several_kicks(scene: Array, order: NDArray[np.int64], wish: Wish, most: int) -> tuple[float, float, float]:
+def best_sequence(scene: Array, order: NDArray[np.int64], target: Target, most: int) -> tuple[float, float, float]:
     """The speed that at most ``most`` kicks give the ball towards a place, and its velocity after the first.
 
     Args:
-        order: as of `paths`.
+        order: see `kick_order`.
     """
-    me, ball, gain = scene[ME], scene[BALL], scene[BALL, GAIN]
-    to_x, to_y, wanted = wish.x, wish.y, wish.speed
+    me, ball, gain, server = scene[ACTOR], scene[BALL], scene[BALL, GAIN], scene[SERVER]
+    to_x, to_y, wanted = target.x, target.y, target.speed
     radius, rate, place = np.empty(PLACES), np.empty(PLACES), np.empty((2, PLACES, 2))
     _places(me, radius, rate, place)
     dangers = np.empty((2, PLACES), np.int64)
     for cycle in range(2):
         for index in range(PLACES):
             x, y = place[cycle, index, 0], place[cycle, index, 1]
-            found = _dangers(scene, x, y)
-            if abs(x) > GOAL_X or abs(y) > pitch.HALF_WIDTH:
-                found |= OUTSIDE
-            dangers[cycle, index] = found | _dangers_after(scene, x, y, wish, cycle + 2)
-    now = _dangers(scene, ball[0], ball[1])
-    soon = _dangers_after(scene, ball[0], ball[1], wish, 1)
+            found = OUTSIDE if abs(x) > GOAL_X or abs(y) > LINE_Y else 0
+            found |= _dangers(scene, (x, y), 1, LIES)
+            dangers[cycle, index] = found | _dangers(scene, _kicked_on((x, y), target), cycle + 2, KICKED_ON)
+    now = _dangers(scene, (ball[X], ball[Y]), 1, LIES)
+    soon = _dangers(scene, _kicked_on((ball[X], ball[Y]), target), 1, KICKED_ON)
     begun = now | (soon & ~CUT_OFF)
 
     speeds, powers, velocity = np.empty(MOST), np.empty(MOST), np.empty((MOST, 2))
     kicks, threats = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
     count = 0
-    most_push = min(100.0 * gain, BALL_PUSH_MAX)
+    most_added = most_acceleration(server, gain)
     if not soon & CUT_OFF:
-        metres = math.hypot(to_x - ball[0], to_y - ball[1])
-        cos, sin = (to_x - ball[0]) / metres, (to_y - ball[1]) / metres
+        metres = math.hypot(to_x - ball[X], to_y - ball[Y])
+        cos, sin = (to_x - ball[X]) / metres, (to_y - ball[Y]) / metres
         speed = wanted
-        if math.hypot(wanted * cos - ball[2], wanted * sin - ball[3]) > most_push:
-            speed = fastest(cos, sin, gain, ball[2], ball[3])
-        speeds[0], powers[0] = speed, math.hypot(speed * cos - ball[2], speed * sin - ball[3]) / gain
+        if math.hypot(wanted * cos - ball[VX], wanted * sin - ball[VY]) > most_added:
+            speed = fastest_from(scene, cos, sin, gain)
+        speeds[0], powers[0] = speed, math.hypot(speed * cos - ball[VX], speed * sin - ball[VY]) / gain
         velocity[0, 0], velocity[0, 1], kicks[0], threats[0] = speed * cos, speed * sin, 1, begun
         count = 1
-    doubt, blurred = math.hypot(me[VX], me[VY]) * PLAYER_RAND, me[KICK_RAND] * blur(scene)
+    own_noise, noise = math.hypot(me[VX], me[VY]) * server[PLAYER_RAND], kick_noise(scene)
     facing = turned(direction(to_x - me[X], to_y - me[Y]) - me[BODY])
     turn = int(np.rint(DIRECTIONS * (facing + 180.0) / 360.0)) % DIRECTIONS
     for careless in range(2):
-        if careless and count and speeds[:count].max() > wish.enough:
+        if careless and count and speeds[:count].max() > target.enough:
             break
         never = OUTSIDE | LOST | CUT_OFF
         avoided = never if careless else never | RISKS
@@ -276,28 +279,28 @@ def several_kicks(scene: Array, order: NDArray[np.int64], wish: Wish, most: int)
                 if dangers[cycle, last] & avoided:
                     continue
                 # To the first place.
-                vx, vy = place[0, first, 0] - ball[0], place[0, first, 1] - ball[1]
-                push = math.hypot(vx - ball[2], vy - ball[3])
-                if push > most_push:
+                vx, vy = place[0, first, 0] - ball[X], place[0, first, 1] - ball[Y]
+                added = math.hypot(vx - ball[VX], vy - ball[VY])
+                if added > most_added:
                     continue
-                miss = doubt + math.hypot(vx, vy) * BALL_RAND + blurred * push / gain / 100.0
+                miss = own_noise + math.hypot(vx, vy) * server[BALL_RAND] + noise * added / gain / server[MAX_POWER]
                 threat = begun | dangers[cycle, last]
-                to_vx, to_vy = vx * BALL_DECAY, vy * BALL_DECAY
+                to_vx, to_vy = vx * server[BALL_DECAY], vy * server[BALL_DECAY]
                 if stage == 3:
                     threat |= dangers[0, first] & ~CUT_OFF
                     next_vx = place[1, last, 0] - place[0, first, 0]
                     next_vy = place[1, last, 1] - place[0, first, 1]
-                    if math.hypot(next_vx - to_vx, next_vy - to_vy) > min(90.0 * rate[first], BALL_PUSH_MAX):
+                    if math.hypot(next_vx - to_vx, next_vy - to_vy) > most_acceleration(server, 0.9 * rate[first]):
                         continue
-                    to_vx, to_vy = next_vx * BALL_DECAY, next_vy * BALL_DECAY
+                    to_vx, to_vy = next_vx * server[BALL_DECAY], next_vy * server[BALL_DECAY]
                 # And from the last one on.
                 x, y = place[cycle, last, 0], place[cycle, last, 1]
                 metres = math.hypot(to_x - x, to_y - y)
                 cos, sin = (to_x - x) / metres, (to_y - y) / metres
                 speed = wanted
                 where = count
-                if math.hypot(wanted * cos - to_vx, wanted * sin - to_vy) > min(100.0 * rate[last], BALL_PUSH_MAX):
-                    speed = fastest(cos, sin, rate[last], to_vx, to_vy)
+                if math.hypot(wanted * cos - to_vx, wanted * sin - to_vy) > most_acceleration(server, rate[last]):
+                    speed = fastest(kick_limits(server, rate[last]), (cos, sin), (to_vx, to_vy))
                     if (done and stage == 3) or speed <= fastest_so_far:
                         continue
                     # Of those that fall short one is kept; it takes the place of what was found last.
@@ -314,7 +317,7 @@ def several_kicks(scene: Array, order: NDArray[np.int64], wish: Wish, most: int)
                 count = max(count, where + 1)
     best, chosen = -np.inf, -1
     for index in range(count):
-        value = _judged(wish, speeds[index], powers[index], kicks[index], threats[index])
+        value = _judged(target, speeds[index], powers[index], kicks[index], threats[index])
         if value > best:
             best, chosen = value, index
     if chosen < 0:

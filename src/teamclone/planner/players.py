@@ -1,257 +1,184 @@
-"""Players as they are thought of while planning, and how soon they can be somewhere.
-
-Compiled, as all of the planning; angles are in degrees.
-"""
+"""The player model: how soon a player can be somewhere, and what it reaches in its next cycle."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after
+from teamclone.planner.scene import (
+    AREA,
+    AWAY,
+    BALL,
+    BODY,
+    CATCH,
+    DECAY,
+    FROZEN,
+    GOALKEEPER,
+    LAG,
+    SERVER,
+    TACKLE_CYCLES,
+    TACKLE_DIST,
+    TACKLE_WIDTH,
+    TOP,
+    TURN,
+    TURNS,
+    Array,
+    X,
+    Y,
+    along,
+    direction,
+    in_their_area,
+    inertia_point,
+    kernel,
+    turned,
+)
 
-from teamclone.planner.constants import BALL_DECAY, BALL_SIZE, BALL_SPEED_MAX, TURN_MARGIN_DEG
-from teamclone.rcss import pitch
-from teamclone.world.channels import CHANNEL, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING, TYPE_FIELD
-
-Array = NDArray[np.float64]
-
-kernel: Any = njit(nogil=True, error_model="numpy")
-"""None of these is cached: `plan.plans` keeps all of them together, since the cache does not see who calls whom."""
-
-(X, Y, VX, VY, BODY, STAMINA, EFFORT, RECOVERY, CAPACITY, THERE, KEEPER, TACKLING, SIZE, MARGIN, AREA, DASH_RATE, PUSH,
- DECAY, INERTIA, LIMIT, INCOME, EXTRA, EFFORT_MIN, EFFORT_MAX, KICK_RATE, KICK_RAND, TOP, RECEIVES,
- WAY) = range(29)  # fmt: skip
-"""Columns of a player. SIZE: metres between the centres of player and ball that touch; MARGIN: by how much more he can
-kick it; AREA: both. PUSH: metres per cycle that a dash at full power adds; LIMIT: of his speed; TOP: the speed that he
-reaches. INCOME: stamina of a cycle; EXTRA: what is left when all is spent. RECEIVES: whether he may get a pass. From
-WAY on: metres that 1, 2, ... dashes at full power cover from rest."""
-RUN = 50
-"""Dashes of which the way is kept."""
-COLUMNS = WAY + RUN
-OPPONENT, BALL, ME, ROWS = 11, 22, 23, 24
-"""Rows of a scene: the team, from here on the opponents, the ball, and once more who has it. Who is not there is far
-away."""
-GAIN, OFFSIDE = BODY, STAMINA
-"""Columns of the ball: speed that a unit of his kick power gives it; the offside line."""
-NOWHERE_M = 1e6
-BALL_PUSH_MAX, PLAYER_PUSH_MAX, BALL_RAND, PLAYER_RAND = 2.7, 1.0, 0.05, 0.1
-"""rcssserver `serverparam.cpp`: ball_accel_max, player_accel_max, ball_rand, player_rand."""
-TACKLE_M, TACKLE_WIDTH_M = 2.0, 1.25
-"""The same: tackle_dist, tackle_width."""
-TACKLE_EXPONENT, FOUL_EXPONENT = 6.0, 10.0
-"""The same: tackle_exponent, foul_exponent."""
-CATCH_M = math.hypot(1.2, 0.5)
-"""From the keeper's centre to a far corner of what he can catch."""
-PENALTY_X, PENALTY_Y = pitch.HALF_LENGTH - pitch.PENALTY_AREA_LENGTH, pitch.PENALTY_AREA_WIDTH / 2
-GOAL_X, GOAL_Y = pitch.HALF_LENGTH, pitch.GOAL_WIDTH / 2
-NEVER = 1000
-HARDLY = 0.001
+HARDLY_M = 0.001
 """Metres that count as nothing."""
+FACED_DEG = 15.0
+"""A player dashes without a turn to what is at most so far off its body."""
+FROZEN_PART = 0.5
+"""Of the server's tackle_cycles: how long a player that is tackling goes on with it, on average."""
 
 
-_CHANNELS = np.array(
-    [CHANNEL[name] for name in ("x", "y", "vx", "vy", "body", "stamina", "effort", "recovery", "capacity")]
-)
-_FLAGS = CHANNEL["flags"]
-_BALL = X, Y, VX, VY
-_FIELDS = (
-    (SIZE, "player_size"),
-    (MARGIN, "kickable_margin"),
-    (DASH_RATE, "dash_power_rate"),
-    (DECAY, "player_decay"),
-    (INERTIA, "inertia_moment"),
-    (LIMIT, "player_speed_max"),
-    (INCOME, "stamina_inc_max"),
-    (EXTRA, "extra_stamina"),
-    (EFFORT_MIN, "effort_min"),
-    (EFFORT_MAX, "effort_max"),
-    (KICK_RATE, "kick_power_rate"),
-    (KICK_RAND, "kick_rand"),
-)
+class Allowance(NamedTuple):
+    """What is allowed for an opponent that may be at the ball first, by how the ball is played.
+
+    Attributes:
+        touch_m: metres beyond its reach within which an opponent that only drifts has the ball.
+        reach: part of its reach that shortens its dashes.
+        ahead_m: metres that shorten them, too; unsure: more of them per metre between the opponent and the actor.
+        turn_m: metres by which the reach is wider where it decides on a turn.
+        back_m: metres within which it dashes backwards instead of turning.
+        behind_m: how far it may be behind the ball and still come, seen along the path of the ball.
+        early: cycles that it is thought to be earlier; early_x, earlier_x: one more before each of these x.
+    """
+
+    touch_m: float = 0.0
+    reach: float = 1.0
+    ahead_m: float = 0.0
+    unsure: float = 0.0
+    turn_m: float = 0.0
+    back_m: float = 0.0
+    behind_m: float = -1.0
+    early: float = 0.0
+    early_x: float = -math.inf
+    earlier_x: float = -math.inf
 
 
-def described(ball: Array, players: Array, types: Array) -> Array:
-    """(batch, ROWS, COLUMNS) scenes of the ball, players and types of a `State`, but for what hangs on the actor."""
-    made = np.zeros((len(ball), ROWS, COLUMNS))
-    made[:, BALL, : len(_BALL)] = ball
-    team = made[:, :BALL]
-    team[..., :THERE] = players[..., _CHANNELS]
-    with np.errstate(invalid="ignore"):
-        flags = players[..., _FLAGS].astype(np.int64)
-    for column, flag in ((THERE, FLAG_ON_FIELD), (KEEPER, FLAG_GOALIE), (TACKLING, FLAG_TACKLING)):
-        team[..., column] = (flags & flag) != 0
-    team[team[..., THERE] == 0, :VX] = NOWHERE_M
-    for column, name in _FIELDS:
-        team[..., column] = types[..., TYPE_FIELD[name]]
-    team[..., SIZE] += BALL_SIZE
-    team[..., AREA] = team[..., SIZE] + team[..., MARGIN]
-    team[..., PUSH] = np.minimum(100.0 * team[..., DASH_RATE] * team[..., EFFORT_MAX], PLAYER_PUSH_MAX)
-    return made
-
-
-@kernel
-def turned(degrees: float) -> float:
-    """The same angle in [-180, 180)."""
-    return (degrees + 180.0) % 360.0 - 180.0
+RECEIVER = Allowance(touch_m=-math.inf, reach=0.0)
+PASS = Allowance(touch_m=0.15, ahead_m=0.5)
+LONG_PASS = Allowance(touch_m=0.15, ahead_m=0.2)
+BOLD_PASS = Allowance(touch_m=0.15)
+DRIBBLE = Allowance(reach=0.5, ahead_m=0.2, behind_m=-4.0, early_x=30.0, earlier_x=0.0)
+SELF_PASS = Allowance(ahead_m=0.2, unsure=0.01, behind_m=-4.0)
+SELF_PASS_AHEAD = Allowance(ahead_m=0.2, unsure=0.01, behind_m=-4.0, early=1.0, early_x=27.0)
+SHOT = Allowance(reach=0.8, early=-1.0)
+SHOT_GOALKEEPER = Allowance(touch_m=0.15, reach=0.9, unsure=0.02, turn_m=0.1)
+TACKLE = Allowance(ahead_m=0.5, back_m=5.0)
 
 
 @kernel
-def direction(x: float, y: float) -> float:
-    return math.degrees(math.atan2(y, x))
+def reach_of(player: Array, x: float, y: float) -> float:
+    """Return how far from its centre a player has a ball in a place: a goalkeeper catches it in its penalty area."""
+    return player[CATCH] if player[GOALKEEPER] > 0 and in_their_area(x, y) else player[AREA]
 
 
 @kernel
-def prepare(player: Array) -> None:
-    """Fill TOP and WAY."""
-    speed, covered = 0.0, 0.0
-    for count in range(RUN):
-        speed += min(player[PUSH], player[LIMIT] - speed)
-        covered += speed
-        player[WAY + count] = covered
-        speed *= player[DECAY]
-    player[TOP] = min(player[PUSH] / (1.0 - player[DECAY]), player[LIMIT])
-
-
-@kernel
-def dashes(player: Array, metres: float) -> int:
-    """How many dashes cover so much."""
-    if metres <= HARDLY:
+def turns(player: Array, off: float, metres: float, within_m: float) -> int:
+    """Return the turns until a player faces what is ``off`` degrees aside and so far away, to ``within_m`` of it."""
+    if metres <= within_m:
         return 0
-    if metres - HARDLY > player[WAY + RUN - 1]:
-        return RUN + math.ceil((metres - player[WAY + RUN - 1]) / player[TOP])
-    return int(np.searchsorted(player[WAY:], metres - HARDLY)) + 1
-
-
-@kernel
-def most_turn(player: Array, speed: float) -> float:
-    """Degrees that he turns in a cycle while he moves so fast (rcssserver `player.cpp`, turn)."""
-    return 180.0 / (1.0 + player[INERTIA] * speed)
-
-
-@kernel
-def turns(player: Array, toward: float, metres: float, near_m: float) -> int:
-    """How many turns until he faces a place so far away, in this direction, to within what ``near_m`` leaves."""
-    return turns_over(player, abs(turned(toward - player[BODY])), metres, near_m)
-
-
-@kernel
-def turns_over(player: Array, left: float, metres: float, near_m: float) -> int:
-    """The same over so many degrees."""
-    margin = 180.0
-    if near_m < metres:
-        margin = max(TURN_MARGIN_DEG, math.degrees(math.asin(near_m / metres)))
-    speed = math.hypot(player[VX], player[VY])
+    over = abs(off) - max(FACED_DEG, math.degrees(math.asin(within_m / metres)))
     count = 0
-    while left > margin and count < RUN:
-        left -= most_turn(player, speed)
-        speed *= player[DECAY]
+    while count < TURNS and over > (player[TURN + count - 1] if count else 0.0):
         count += 1
     return count
 
 
 @kernel
-def steps(player: Array, way_xy: tuple[float, float], dash_m: float, near_m: float) -> int:
-    """Cycles that turns and then dashes over ``dash_m`` take; who turns sees the ball a cycle late.
+def dashes(player: Array, metres: float) -> int:
+    """Return the dashes at full power from rest that cover so much, the inverse of `dynamics.formulas.covered`.
 
-    Args:
-        way_xy: to the place from where he is then. near_m: as of `turns`.
+    A player at its top speed needs s = metres / TOP cycles. From rest n = s + LAG * (1 - DECAY ** n), to which Newton's
+    steps lead from above.
     """
-    toward, metres = direction(way_xy[0], way_xy[1]), math.hypot(way_xy[0], way_xy[1])
-    count = turns(player, toward, metres, near_m)
-    if count:
-        count += 1
-    return count + dashes(player, dash_m)
+    if metres <= HARDLY_M:
+        return 0
+    at_speed = (metres - HARDLY_M) / player[TOP]
+    lag, decay = player[LAG], player[DECAY]
+    most = count = at_speed + lag
+    if at_speed < 8.0:
+        rate = math.log(decay)
+        for _ in range(3):
+            left = lag * decay**count
+            count -= (count - most + left) / (1.0 + rate * left)
+    return math.ceil(min(count, NEVER_CYCLES))
 
 
 @kernel
-def coasted(player: Array, cycles: float) -> tuple[float, float]:
-    """Where he is after so many cycles without a dash."""
-    part = (1.0 - player[DECAY] ** cycles) / (1.0 - player[DECAY])
-    return player[X] + player[VX] * part, player[Y] + player[VY] * part
+def arrival(scene: Array, player: Array, place: tuple[float, float], cycle: int, allowance: Allowance) -> int:
+    """Return after how many cycles a player has a ball that is in a place after ``cycle`` of them.
+
+    Turns and dashes count from where the player drifts to by then. A player that turns sees the ball a cycle late; one
+    that is tackling lies first. NEVER_CYCLES if it is clearly more than ``cycle``.
+    """
+    from_x, from_y = inertia_point(player, cycle)
+    way_x, way_y = place[0] - from_x, place[1] - from_y
+    metres, reach = math.hypot(way_x, way_y), reach_of(player, place[0], place[1])
+    if metres < reach + allowance.touch_m + HARDLY_M:
+        return 0
+    dash_m = metres - allowance.reach * reach - allowance.ahead_m - allowance.unsure * player[AWAY]
+    early = allowance.early + (place[0] < allowance.early_x) + (place[0] < allowance.earlier_x)
+    if dash_m > player[TOP] * (cycle + early + 2.0):
+        return NEVER_CYCLES
+    off = abs(turned(direction(way_x, way_y) - player[BODY]))
+    if metres < allowance.back_m:
+        off = min(off, 180.0 - off)
+    count = turns(player, off, metres, reach + allowance.turn_m)
+    count += (count > 0) + dashes(player, dash_m)
+    if player[FROZEN] > 0:
+        count += int(FROZEN_PART * scene[SERVER, TACKLE_CYCLES])
+    return count - int(early)
 
 
 @kernel
-def at_rest(player: Array) -> tuple[float, float]:
-    return player[X] + player[VX] / (1.0 - player[DECAY]), player[Y] + player[VY] / (1.0 - player[DECAY])
+def first_cycle(scene: Array, player: Array, path: Path, behind_m: float) -> int:
+    """Return the first cycle in which a player may be on the path of the ball; NEVER_CYCLES for one behind it."""
+    ahead, aside = along(player[X] - scene[BALL, X], player[Y] - scene[BALL, Y], path.cos, path.sin)
+    return NEVER_CYCLES if ahead < behind_m else max(1, int(abs(aside) / player[TOP]))
 
 
 @kernel
-def in_their_box(x: float, y: float) -> bool:
-    return x > PENALTY_X and abs(y) < PENALTY_Y
+def intercept(scene: Array, player: Array, path: Path, cycles: tuple[int, int], allowance: Allowance) -> int:
+    """Return the cycle in which a player first has a ball on its path, from the first to the last of ``cycles``.
+
+    NEVER_CYCLES if in none of them.
+    """
+    for cycle in range(cycles[0], cycles[1] + 1):
+        if arrival(scene, player, ball_after(scene, path, cycle), cycle, allowance) <= cycle:
+            return cycle
+    return NEVER_CYCLES
 
 
 @kernel
-def reach_of(player: Array, x: float, y: float) -> float:
-    """How far from his centre he has a ball in a place: who keeps the goal catches it in his box."""
-    return CATCH_M if player[KEEPER] > 0 and in_their_box(x, y) else player[AREA]
-
-
-@kernel
-def beside(player: Array, from_xy: tuple[float, float], x: float, y: float) -> tuple[float, float]:
-    """How far a place is ahead of him, and aside, seen from where he is then."""
+def seen_from(player: Array, place: tuple[float, float], cycle: int) -> tuple[float, float]:
+    """Return how far a place is ahead of a player, and aside, from where it drifts to in so many cycles."""
+    from_x, from_y = inertia_point(player, cycle)
     body = math.radians(player[BODY])
-    cos, sin = math.cos(body), math.sin(body)
-    away_x, away_y = x - from_xy[0], y - from_xy[1]
-    return away_x * cos + away_y * sin, away_y * cos - away_x * sin
+    return along(place[0] - from_x, place[1] - from_y, math.cos(body), math.sin(body))
 
 
 @kernel
-def tackle_chance(ahead: float, aside: float, exponent: float) -> float:
-    """Of a tackle at a ball there, 0 and less where it cannot succeed; `physics.tackle_failure` has the same."""
+def after_dash(ahead: float, aside: float, dash_m: float) -> float:
+    """Return how near a dash of at most ``dash_m``, ahead or back, brings a player to a place."""
+    return math.hypot(max(0.0, abs(ahead) - dash_m), aside)
+
+
+@kernel
+def tackle_chance(server: Array, ahead: float, aside: float, exponent: float) -> float:
+    """Return the probability of a tackle, at most 0 where it cannot succeed; 1 - `dynamics.formulas.tackle_failure`."""
     if ahead <= 0:
         return 0.0
-    return 1.0 - ((ahead / TACKLE_M) ** exponent + (abs(aside) / TACKLE_WIDTH_M) ** exponent)
-
-
-@kernel
-def bell(value: float, width: float) -> float:
-    return math.exp(-0.5 * (value / width) ** 2)
-
-
-@kernel
-def gap(x: float, y: float, at_x: float, at_y: float) -> float:
-    """Metres between two places."""
-    return math.hypot(x - at_x, y - at_y)
-
-
-@kernel
-def rolled(speed: float, cycles: float) -> float:
-    """Metres of a ball with this speed."""
-    return speed * (1.0 - BALL_DECAY**cycles) / (1.0 - BALL_DECAY)
-
-
-@kernel
-def speed_over(metres: float, cycles: float) -> float:
-    """With which a ball rolls so far in so many cycles."""
-    return metres * (1.0 - BALL_DECAY) / (1.0 - BALL_DECAY**cycles)
-
-
-@kernel
-def cycles_over(metres: float, speed: float) -> int:
-    """Whole cycles after which a ball with this speed has rolled so far."""
-    left = 1.0 - metres * (1.0 - BALL_DECAY) / speed
-    return NEVER if left <= 0 else math.ceil(math.log(left) / math.log(BALL_DECAY))
-
-
-@kernel
-def kick_rate(player: Array, metres: float, aside: float) -> float:
-    """Speed that a unit of power gives a ball so far from the player's centre, so many degrees off his body."""
-    off = abs(turned(aside)) / 180.0
-    return player[KICK_RATE] * (1.0 - 0.25 * off - 0.25 * (metres - player[SIZE]) / player[MARGIN])
-
-
-@kernel
-def fastest(cos: float, sin: float, gain: float, vx: float, vy: float) -> float:
-    """The greatest speed in a direction that one kick gives a ball with this velocity; 0 if it cannot go there."""
-    most = min(100.0 * gain, BALL_PUSH_MAX)
-    along = vx * cos + vy * sin
-    rest = most * most - (vx * vx + vy * vy - along * along)
-    if rest < 0:
-        return 0.0
-    half = math.sqrt(rest)
-    if along + half > BALL_SPEED_MAX:
-        return 0.0 if along - half > BALL_SPEED_MAX else BALL_SPEED_MAX
-    return max(0.0, along + half)
+    return 1.0 - ((ahead / server[TACKLE_DIST]) ** exponent + (abs(aside) / server[TACKLE_WIDTH]) ** exponent)

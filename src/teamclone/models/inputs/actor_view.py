@@ -9,6 +9,7 @@ from torch import Tensor
 
 from teamclone.dynamics.formulas import radians
 from teamclone.models.inputs.axes import Axes, polar
+from teamclone.models.inputs.planned import plans
 from teamclone.models.inputs.reach import (
     NEVER_CYCLES,
     REACH_CYCLES,
@@ -16,7 +17,6 @@ from teamclone.models.inputs.reach import (
     kickable_area,
     reach_ball,
 )
-from teamclone.planner.plan import plans
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD, FLAG_TACKLING

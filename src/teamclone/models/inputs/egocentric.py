@@ -29,8 +29,7 @@ from teamclone.models.inputs.geometry import (
 )
 from teamclone.models.inputs.paper import Normalisation, TypeParameters
 from teamclone.models.inputs.reach import REACH_CYCLES
-from teamclone.planner.plan import CHOICES, PLAN, UNDERWAY, WAYS, WORTHS
-from teamclone.planner.plan import FAR_M as WORTH_M
+from teamclone.planner.plan import CHOICES, MOST_VALUE_M, PLAN, UNDERWAY, VALUED, WAYS
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import DEFAULTS, GROUPS
@@ -296,13 +295,13 @@ def _lines(features: EgocentricFeatures, view: ActorView) -> Tensor:
 def _plan(features: EgocentricFeatures, view: ActorView) -> Tensor:
     """Return what is planned with the ball, zeros for an actor who cannot kick it."""
     column = {name: view.plans[:, index, None] for index, name in enumerate(PLAN)}
-    worths = torch.cat([column[f"{name}_worth"] for name in WORTHS], 1)
+    values = torch.cat([column[f"{name}_value"] for name in VALUED], 1)
     seen = [
         column["able"],
         *(column[f"choose_{name}"] for name in CHOICES),
         *(column[f"{name}_there"] for name in WAYS),
     ]
-    seen += [worths / WORTH_M, worths.clamp(-1.0, 1.0), column["pass_kicks"] / 3, column["pass_cycles"] / 20]
+    seen += [values / MOST_VALUE_M, values.clamp(-1.0, 1.0), column["pass_kicks"] / 3, column["pass_cycles"] / 20]
     for name in UNDERWAY:
         value = column[f"underway_{name}"]
         # A miss of centimetres was meant, one of more was not.

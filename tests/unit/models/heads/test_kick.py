@@ -26,7 +26,8 @@ from teamclone.models.heads.kick import (
 )
 from teamclone.models.heads.mixture import TACKLE_DIRECTIONS, MixtureHead, class_of
 from teamclone.models.inputs.geometry import GEOMETRY, MATES
-from teamclone.planner.plan import PLAN, WAYS, plans
+from teamclone.models.inputs.planned import plans
+from teamclone.planner.plan import PLAN, WAYS
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 from teamclone.world.mirror import mirror_state, mirror_target
 from teamclone.world.state import State, Target
@@ -204,8 +205,8 @@ def test_errors_of_what_is_planned_are_of_the_ball_velocity() -> None:
     assert kicks.planned is not None
     with torch.no_grad():
         kicks.planned.error[WAYS.index("pass")] = math.log(2.0)
-        power, direction = kicks(torch.zeros(1, 3), planned({"pass": (1.2, 0.7), "run": (0.5, -0.2)}))
-    for name, factor, added in (("pass", 2.0, math.hypot(0.9, 0.9)), ("run", 1.0, 0.2)):
+        power, direction = kicks(torch.zeros(1, 3), planned({"pass": (1.2, 0.7), "self_pass": (0.5, -0.2)}))
+    for name, factor, added in (("pass", 2.0, math.hypot(0.9, 0.9)), ("self_pass", 1.0, 0.2)):
         place = N_COMPONENTS + WAYS.index(name)
         error = factor * USUAL_ERROR
         assert power.scale[0, place].item() == pytest.approx(LEAST_POWER + error / 0.02)

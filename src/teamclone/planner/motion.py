@@ -1,0 +1,92 @@
+"""A player's next cycles: where dashes and turns bring it, and its stamina (rcssserver `player.cpp`, updateStamina)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from teamclone.planner.scene import (
+    CAPACITY,
+    DASH_RATE,
+    DECAY,
+    EFFORT,
+    EFFORT_MAX,
+    EFFORT_MIN,
+    EXTRA,
+    MAX_DASH,
+    RECOVERY,
+    STAMINA,
+    STAMINA_INC,
+    VX,
+    VY,
+    Array,
+    X,
+    Y,
+    kernel,
+)
+from teamclone.rcss.server_params import SERVER_FIELD
+
+S_X, S_Y, S_VX, S_VY, S_STAMINA, S_EFFORT, S_RECOVERY, S_CAPACITY = range(8)
+"""Columns of a player's motion, a part of the columns of a player."""
+(_MOST, _TOTAL, _RECOVER_THR, _RECOVER_DEC, _RECOVER_MIN, _EFFORT_DEC_THR, _EFFORT_DEC, _EFFORT_INC_THR, _EFFORT_INC,
+ _ACCEL_MAX) = (SERVER_FIELD[name] for name in (
+    "stamina_max", "stamina_capacity", "recover_dec_thr", "recover_dec", "recover_min", "effort_dec_thr", "effort_dec",
+    "effort_inc_thr", "effort_inc", "player_accel_max"))  # fmt: skip
+
+
+@kernel
+def motion_of(me: Array) -> Array:
+    """Return (8,) a player's motion now."""
+    return np.array([me[X], me[Y], me[VX], me[VY], me[STAMINA], me[EFFORT], me[RECOVERY], me[CAPACITY]])
+
+
+@kernel
+def recover(server: Array, me: Array, motion: Array) -> None:
+    """Change stamina, effort, recovery and capacity as the end of a cycle does; `dynamics.formulas.rested`."""
+    stamina, most = motion[S_STAMINA], server[_MOST]
+    if stamina <= server[_RECOVER_THR] * most:
+        motion[S_RECOVERY] = max(motion[S_RECOVERY] - server[_RECOVER_DEC], server[_RECOVER_MIN])
+    if stamina <= server[_EFFORT_DEC_THR] * most:
+        motion[S_EFFORT] = max(motion[S_EFFORT] - server[_EFFORT_DEC], me[EFFORT_MIN])
+    if stamina >= server[_EFFORT_INC_THR] * most:
+        motion[S_EFFORT] = min(motion[S_EFFORT] + server[_EFFORT_INC], me[EFFORT_MAX])
+    recovered = min(me[STAMINA_INC] * motion[S_RECOVERY], most - stamina)
+    if server[_TOTAL] >= 0:
+        recovered = min(recovered, motion[S_CAPACITY])
+    motion[S_STAMINA] += recovered
+    motion[S_CAPACITY] = max(0.0, motion[S_CAPACITY] - recovered)
+
+
+@kernel
+def drift(server: Array, me: Array, motion: Array) -> None:
+    """Pass a cycle without a dash."""
+    motion[S_X] += motion[S_VX]
+    motion[S_Y] += motion[S_VY]
+    motion[S_VX] *= me[DECAY]
+    motion[S_VY] *= me[DECAY]
+    recover(server, me, motion)
+
+
+@kernel
+def dash(server: Array, me: Array, motion: Array, power: float, heading: tuple[float, float]) -> None:
+    """Pass a cycle with a dash straight ahead.
+
+    Args:
+        heading: cosine and sine of the body.
+    """
+    added = min(power * me[DASH_RATE] * motion[S_EFFORT], server[_ACCEL_MAX])
+    motion[S_VX] += added * heading[0]
+    motion[S_VY] += added * heading[1]
+    motion[S_STAMINA] = max(0.0, motion[S_STAMINA] - power)
+    drift(server, me, motion)
+
+
+@kernel
+def spare(server: Array, me: Array, motion: Array, reserve: float, last: bool) -> float:
+    """Return the power of a dash that leaves ``reserve`` beyond what lets recovery fall.
+
+    Args:
+        last: whether a player without capacity, who has nothing to save for, spends all.
+    """
+    spends_all = last and motion[S_CAPACITY] <= 0
+    kept = -me[EXTRA] if spends_all else server[_RECOVER_THR] * server[_MOST] + reserve
+    return min(max(0.0, motion[S_STAMINA] - kept), server[MAX_DASH])

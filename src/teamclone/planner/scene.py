@@ -1,0 +1,188 @@
+"""Scenes: all that a plan is made from, packed for the kernels into one array a sample. Angles are in degrees."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from teamclone.rcss import pitch
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
+from teamclone.rcss.server_params import FIELDS, SERVER_FIELD
+from teamclone.world.channels import CHANNEL, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING, TYPE_FIELD
+
+Array = NDArray[np.float64]
+
+kernel: Any = njit(nogil=True, error_model="numpy")
+"""None of these is cached: `plan.plan` keeps all of them together, since the cache does not see which calls which."""
+
+OPPONENT, BALL, ACTOR, SERVER, ROWS = N_TEAM, N_PLAYERS, N_PLAYERS + 1, N_PLAYERS + 2, N_PLAYERS + 3
+"""Rows: the team, from OPPONENT on the opponents, the ball, once more the player who acts, and the server's parameters.
+A player who is not on the field is far away."""
+
+(X, Y, VX, VY, BODY, STAMINA, EFFORT, RECOVERY, CAPACITY, PRESENT, GOALKEEPER, FROZEN, TOUCH, MARGIN, AREA, CATCH,
+ DASH_RATE, DASH_ACCEL, DECAY, INERTIA, SPEED_MAX, STAMINA_INC, EXTRA, EFFORT_MIN, EFFORT_MAX, KICK_RATE, KICK_RAND,
+ TOP, LAG, AWAY, RECEIVES, TURN) = range(32)  # fmt: skip
+"""Columns of a player. FROZEN: is tackling; TOUCH: metres between the centres of player and ball that touch; MARGIN: by
+how much farther the player can kick it; AREA: both; CATCH: metres to which a goalkeeper catches in its penalty area.
+DASH_ACCEL: metres per cycle that a dash at full power adds; TOP: speed that such dashes lead to; LAG: by how many
+cycles a player that starts from rest is behind one at that speed. AWAY: metres from the actor. RECEIVES: may get a
+pass. From TURN on: degrees that 1, 2, ... turns turn the player."""
+TURNS = 8
+"""Turns of which the degrees are kept."""
+ROLL = TURN + TURNS
+"""From here on: metres that a body covers in 0, 1, ... cycles per metre per cycle of its first velocity. The ball has
+these, X to VY and DECAY."""
+CYCLES = 50
+"""Cycles of which ROLL is kept."""
+COLUMNS = max(ROLL + CYCLES + 1, len(FIELDS))
+GAIN, OFFSIDE = BODY, STAMINA
+"""Columns of the ball alone: speed that a unit of the actor's kick power gives it; the offside line."""
+FAR_AWAY_M = 1e6
+
+(BALL_DECAY, BALL_SPEED_MAX, BALL_ACCEL_MAX, BALL_SIZE, BALL_RAND, PLAYER_RAND, MAX_POWER, MAX_DASH, TACKLE_DIST,
+ TACKLE_WIDTH, TACKLE_EXPONENT, FOUL_EXPONENT, TACKLE_CYCLES, TACKLE_RATE, TACKLE_POWER,
+ TACKLE_BACK_POWER) = (SERVER_FIELD[name] for name in (
+    "ball_decay", "ball_speed_max", "ball_accel_max", "ball_size", "ball_rand", "player_rand", "maxpower",
+    "max_dash_power", "tackle_dist", "tackle_width", "tackle_exponent", "foul_exponent", "tackle_cycles",
+    "tackle_power_rate", "max_tackle_power", "max_back_tackle_power"))  # fmt: skip
+"""Columns of the server."""
+
+GOAL_X, GOAL_Y = pitch.HALF_LENGTH, pitch.GOAL_WIDTH / 2
+LINE_Y = pitch.HALF_WIDTH
+PENALTY_X, PENALTY_Y = pitch.HALF_LENGTH - pitch.PENALTY_AREA_LENGTH, pitch.PENALTY_AREA_WIDTH / 2
+
+_CHANNELS = np.array(
+    [CHANNEL[name] for name in ("x", "y", "vx", "vy", "body", "stamina", "effort", "recovery", "capacity")]
+)
+_FIELDS = (
+    (TOUCH, "player_size"),
+    (MARGIN, "kickable_margin"),
+    (DASH_RATE, "dash_power_rate"),
+    (DECAY, "player_decay"),
+    (INERTIA, "inertia_moment"),
+    (SPEED_MAX, "player_speed_max"),
+    (STAMINA_INC, "stamina_inc_max"),
+    (EXTRA, "extra_stamina"),
+    (EFFORT_MIN, "effort_min"),
+    (EFFORT_MAX, "effort_max"),
+    (KICK_RATE, "kick_power_rate"),
+    (KICK_RAND, "kick_rand"),
+)
+
+
+def scenes(ball: Array, players: Array, types: Array, server: Array) -> Array:
+    """Return (n, ROWS, COLUMNS) what of the scenes does not depend on the actor.
+
+    Args:
+        ball: (n, 4) metres, metres per cycle. players: (n, 22, channels) as `PLAYER_CHANNELS` orders them.
+        types: (n, 22, fields) as `player_types.FIELDS`. server: (n, fields) as `server_params.FIELDS`.
+    """
+    made = np.zeros((len(ball), ROWS, COLUMNS))
+    made[:, BALL, : ball.shape[1]] = ball
+    made[:, BALL, DECAY] = server[:, BALL_DECAY]
+    made[:, SERVER, : len(FIELDS)] = server
+    rows = made[:, :BALL]
+    rows[..., :PRESENT] = players[..., _CHANNELS]
+    with np.errstate(invalid="ignore"):
+        flags = players[..., CHANNEL["flags"]].astype(np.int64)
+    for column, flag in ((PRESENT, FLAG_ON_FIELD), (GOALKEEPER, FLAG_GOALIE), (FROZEN, FLAG_TACKLING)):
+        rows[..., column] = (flags & flag) != 0
+    rows[rows[..., PRESENT] == 0, :VX] = FAR_AWAY_M
+    for column, name in _FIELDS:
+        rows[..., column] = types[..., TYPE_FIELD[name]]
+    of = {name: server[:, None, index] for name, index in SERVER_FIELD.items()}
+    rows[..., TOUCH] += of["ball_size"]
+    rows[..., AREA] = rows[..., TOUCH] + rows[..., MARGIN]
+    rows[..., CATCH] = np.hypot(of["catchable_area_l"], of["catchable_area_w"] / 2)
+    full = of["max_dash_power"] * rows[..., DASH_RATE] * rows[..., EFFORT_MAX]
+    rows[..., DASH_ACCEL] = np.minimum(full, of["player_accel_max"])
+    with np.errstate(all="ignore"):  # whatever a log may hold
+        rows[..., TOP] = np.minimum(rows[..., DASH_ACCEL] / (1.0 - rows[..., DECAY]), rows[..., SPEED_MAX])
+        rows[..., LAG] = rows[..., DECAY] / (1.0 - rows[..., DECAY])
+    return made
+
+
+@kernel
+def complete(scene: Array, actor: int) -> None:
+    """Fill what depends on the actor, and the tables of turns and of rolling bodies."""
+    for index in range(BALL + 1):
+        body = scene[index]
+        rolled, part = 0.0, 1.0
+        for cycle in range(CYCLES + 1):
+            body[ROLL + cycle] = rolled
+            rolled += part
+            part *= body[DECAY]
+        if index == BALL:
+            break
+        speed, degrees = math.hypot(body[VX], body[VY]), 0.0
+        for turn in range(TURNS):
+            degrees += most_turn(body, speed)
+            body[TURN + turn] = degrees
+            speed *= body[DECAY]
+        body[AWAY] = gap(body[X], body[Y], scene[actor, X], scene[actor, Y])
+    scene[ACTOR] = scene[actor]
+
+
+@kernel
+def most_turn(player: Array, speed: float) -> float:
+    """Return the degrees by which one turn turns a player with this speed (rcssserver `player.cpp`, turn)."""
+    return 180.0 / (1.0 + player[INERTIA] * speed)
+
+
+@kernel
+def turned(degrees: float) -> float:
+    """Return an angle in [-180, 180)."""
+    return (degrees + 180.0) % 360.0 - 180.0
+
+
+@kernel
+def direction(x: float, y: float) -> float:
+    """Return the direction of a vector in degrees."""
+    return math.degrees(math.atan2(y, x))
+
+
+@kernel
+def gap(x: float, y: float, at_x: float, at_y: float) -> float:
+    """Return the metres between two places."""
+    return math.hypot(x - at_x, y - at_y)
+
+
+@kernel
+def along(x: float, y: float, cos: float, sin: float) -> tuple[float, float]:
+    """Return how far a vector goes along a direction, and how far to its right."""
+    return x * cos + y * sin, y * cos - x * sin
+
+
+@kernel
+def gaussian(value: float, width: float) -> float:
+    """Return a Gaussian curve that is 1 at 0."""
+    return math.exp(-0.5 * (value / width) ** 2)
+
+
+@kernel
+def in_their_area(x: float, y: float) -> bool:
+    """Return whether a place is in the opponents' penalty area."""
+    return x > PENALTY_X and abs(y) < PENALTY_Y
+
+
+@kernel
+def roll(cycles: float, decay: float) -> float:
+    """Return the metres that a body covers per metre per cycle of its first velocity; `dynamics.formulas.roll`."""
+    return (1.0 - decay**cycles) / (1.0 - decay)
+
+
+@kernel
+def inertia_point(body: Array, cycle: int) -> tuple[float, float]:
+    """Return where a player, or the ball, is after so many cycles in which nothing moves it."""
+    factor = body[ROLL + min(cycle, CYCLES)]
+    return body[X] + body[VX] * factor, body[Y] + body[VY] * factor
+
+
+@kernel
+def at_rest(body: Array) -> tuple[float, float]:
+    """Return where a body comes to rest."""
+    return body[X] + body[VX] / (1.0 - body[DECAY]), body[Y] + body[VY] / (1.0 - body[DECAY])

@@ -24,10 +24,11 @@ from teamclone.cli.common import print_table
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.models.clone import Clone
-from teamclone.training.batches import Feed
+from teamclone.training.batches import Batches
 from teamclone.training.config import load_config
 from teamclone.training.group import ALONE
-from teamclone.training.loop import has_fast_bfloat16, train
+from teamclone.training.loop import train
+from teamclone.training.setup import has_fast_bfloat16
 
 BATCH = 4096
 STRETCH = 3
@@ -156,7 +157,7 @@ def main() -> None:
     starts = range(0, len(many), BATCH)
     states = (model.features(dataset.state(many[start : start + BATCH])).detach() for start in starts)
     plain = add("raw states, then inputs from them", consume(states))
-    feed = Feed(dataset, model, CPU, ALONE)
+    feed = Batches(dataset, model, CPU, ALONE)
     add("feeding batches (gather alone)", consume(feed.batches(many, BATCH)), reference=plain, name="states")
     for precision, dtype in (("fp32", torch.float32), ("bf16", torch.bfloat16)):
         if precision == "bf16" and not has_fast_bfloat16(CPU):

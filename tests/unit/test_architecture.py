@@ -55,7 +55,6 @@ MOST_LINES = 80
 TOO_LONG_FOR_NOW = {
     "cli.search.search",
     "logs.rcg_text.read_text",
-    "training.loop.train",
 }
 KERNEL = re.compile(r"_?(njit|kernel|helper)\b")
 """Decorators by which Numba compiles a function. It inlines no call, so a kernel may be long."""

@@ -33,6 +33,7 @@ from teamclone.system.workers import available_cpus, start_worker
 from teamclone.training import loop
 from teamclone.training.config import WITH_ADAM, Config, TrainConfig, config_from, differences, to_table
 from teamclone.training.run import is_run, locked, open_run, save_config
+from teamclone.training.setup import check_commands
 
 FORMAT = 1
 """Raised whenever a reader of the old search.json would misread the new one."""
@@ -483,7 +484,7 @@ def search(
         UsageError: options that do not go together, or a dataset of other commands than the model's.
         RunError: the folder holds something else, or a search that does not fit; or another process searches in it.
     """
-    loop.check_commands(config.base, dataset)
+    check_commands(config.base, dataset)
     plan, folder = PLANS[config.mode](config), Path(out)
     if not (folder / "search.json").exists() and folder.exists():
         left = {".lock", ".search.json.part"}  # by a process killed before it wrote anything

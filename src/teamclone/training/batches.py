@@ -46,7 +46,7 @@ class Batch(NamedTuple):
     whole: Tensor
 
 
-class Feed:
+class Batches:
     """Makes batches for a model.
 
     The paper's inputs are gathered by a compiled pass, one batch ahead. Others, which cost more to make than a training

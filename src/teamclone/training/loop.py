@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import partial
 from itertools import islice
@@ -17,26 +16,21 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from teamclone.dataset.layout import Split
 from teamclone.dataset.order import epoch_mirrored, epoch_order
 from teamclone.dataset.reader import Dataset
-from teamclone.errors import DatasetError, RunError, UsageError
+from teamclone.errors import RunError
 from teamclone.models.answer import Answer
 from teamclone.models.clone import Clone
 from teamclone.models.heads.mixture import WITH_BALL, with_ball
-from teamclone.models.loss import Balance, ParameterLoss
-from teamclone.system.files import write_atomic
-from teamclone.training.batches import Feed
+from teamclone.models.loss import Loss, ParameterLoss
+from teamclone.training.batches import Batch
 from teamclone.training.calibration import Calibration
-from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
-from teamclone.training.config import MAY_CHANGE, Config, TrainConfig, differences
-from teamclone.training.group import joined, local_rank
-from teamclone.training.optimiser import Optimiser, optimiser_of
-from teamclone.training.run import BASE, BEST, RESUME, Base, Run, create_run, locked, open_run, save_config
-from teamclone.training.scores import Scores
+from teamclone.training.config import Config, TrainConfig
+from teamclone.training.logger import RunLogger
+from teamclone.training.metrics import RunningMetrics
+from teamclone.training.run import Base, Run
+from teamclone.training.setup import Setup, prepare
 
-FIT_ROWS = 2**20
-"""Training samples that the input normalisation is fitted on, evenly spread; more would not move it."""
 WARM_UP = 200
 """Batches over which the cosine schedule rises."""
 ONEDNN_ACTIVATIONS = ("relu", "gelu")
@@ -65,7 +59,7 @@ def train(
     base: Base | None = None,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Run:
-    """Train a clone, from fresh weights or from those of ``base``; what a run folder holds is said in `run`.
+    """Train a clone, from fresh weights or from those of ``base``; `run` says what a run folder holds.
 
     Every epoch ends with a checkpoint from which ``resume`` goes on exactly as if nothing had happened: weights,
     order of the samples and figures are a pure function of config and dataset (on one machine, with as many threads).
@@ -77,142 +71,101 @@ def train(
         RunError: the folder holds a run already, or one that does not fit, or another process trains into it; or
             training diverged.
     """
+    epochs = config.train.epochs
     with ExitStack() as stack:
-        check_commands(config, dataset, adapting=base is not None)
-        commands = dataset.commands
-        device, precision = _resources(config.train)
-        group = stack.enter_context(joined(device))
-        rows = dataset.split(Split.TRAIN)
-        validation_rows = _validation_rows(config, dataset)
-        if not len(rows):
-            raise DatasetError(f"{dataset.path}: no training samples; make it again from more matches")
-
-        def begin() -> Run:
-            folder = Path(run_folder)
-            if resume:
-                _check_resumable(config, dataset, open_run(folder))
-            else:
-                create_run(
-                    folder,
-                    config,
-                    dataset,
-                    device=device.type,
-                    precision=precision,
-                    processes=group.size,
-                    base=base,
-                )
-            stack.enter_context(locked(folder))
-            if resume:
-                save_config(folder, config)
-            return open_run(folder)
-
-        run = group.first(begin)
-        torch.manual_seed(config.train.seed)
-        model = Clone(config.model).to(device)
-        optimiser = optimiser_of(config.train, model, precision=precision)
-        for split_rows in (rows, validation_rows):
-            dataset.need(model.inputs.channels, split_rows)
-        feed = Feed(
+        setup = prepare(
+            config,
             dataset,
-            model,
-            device,
-            group,
-            keep_bytes=config.data.keep_gb * 1e9,
-            rows=np.concatenate([rows, validation_rows]),
-            mirrored=rows if config.data.mirror else None,
-            on_progress=lambda made, of: on_progress(Progress(0, config.train.epochs, made, of, None)),
+            Path(run_folder),
+            stack,
+            resume=resume,
+            base=base,
+            on_progress=lambda made, of: on_progress(Progress(0, epochs, made, of, None)),
         )
-        done = 0
-        if run.checkpoint_path(RESUME).is_file():
-            done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
-        elif BASE in run.environment:
-            load_weights(run.checkpoint_path(BASE), model)
-            model.head.temperature.fill_(1.0)  # that of the base suits other teams
-        else:
-            model.inputs.fit(feed.columns(rows[:: max(1, len(rows) // FIT_ROWS)]))
-        group.share_weights(model)
-        answer_of = partial(answer, model, precision=precision)
-        loss_of = partial(
-            model.loss,
-            parameter_loss=cast(ParameterLoss, config.train.parameter_loss),
-            weight=config.train.parameter_weight,
-            aim_weight=config.train.aim_weight,
-        )
-        kinds = dataset.samples["kind"].numpy()[rows]
-        rows_with_ball = rows[np.isin(kinds, WITH_BALL)]
-        draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(commands)), device)
-        batch_size = config.data.batch_size
-        journal = stack.enter_context(Journal(run, done)) if group.rank == 0 else None
+        logger = stack.enter_context(RunLogger(setup.run, setup.done)) if setup.group.rank == 0 else None
         began = time.monotonic()
-        for epoch in range(done + 1, config.train.epochs + 1):
+        for epoch in range(setup.done + 1, epochs + 1):
             epoch_began = time.monotonic()
-            if epoch > done + 1 and config.train.max_minutes:
-                pace = (epoch_began - began) / (epoch - done - 1)
-                late = epoch_began + pace - began > 60 * config.train.max_minutes
-                if group.first(partial(bool, late)):
-                    break
-
-            torch.manual_seed(_mixed(config.train.seed, epoch))
-            chosen = epoch_order(
-                len(rows),
-                seed=config.train.seed,
-                epoch=epoch - 1,
-                slice_rows=config.data.batches_per_epoch * batch_size,
-                draws=None if draws is None else draws[kinds],
-                repeat=config.data.repeat,
-            )
-            order, mirrored = rows[chosen], None
-            if config.data.mirror:
-                mirrored = epoch_mirrored(len(order), seed=config.train.seed, epoch=epoch - 1, share=config.data.mirror)
-            batches = math.ceil(len(order) / batch_size)
-            scores = Scores(device, commands)
-            model.train()
-            kicks = _kick_order(config.train, rows_with_ball, epoch=epoch, batches=batches)
-            kick_batches = feed.batches(kicks, config.train.kicks) if len(kicks) else iter(())
-            for batch, (inputs, target, whole) in enumerate(feed.batches(order, batch_size, mirrored=mirrored), 1):
-                for weights in optimiser.param_groups:
-                    weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
-                output = answer_of(inputs, kicks=with_ball(target))
-                loss = loss_of(output, target, balance=balance, whole=whole)
-                error = loss.total
-                for kick_inputs, kick_target, whole_kicks in islice(kick_batches, 1):
-                    with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bf16"):
-                        taught = model.kick_loss(kick_inputs, kick_target, of=len(whole_kicks))
-                    error = error + config.train.parameter_weight * taught
-                optimiser.zero_grad(set_to_none=True)
-                error.backward()  # type: ignore[no-untyped-call]
-                group.add_up_gradients(model)
-                optimiser.step()
-                with torch.no_grad():
-                    scores.add(loss, output.point(), target, batch=len(whole))
-                on_progress(Progress(epoch, config.train.epochs, batch, batches, None))
-            record: dict[str, Any] = {"epoch": epoch, "samples": len(order)}
-            record |= {f"train_{name}": value for name, value in scores.table(group).items()}
-            record["samples_per_s"] = len(order) / (time.monotonic() - epoch_began)
-            model.eval()
-            scores, calibration = Scores(device, commands), Calibration(device, commands)
-            with torch.no_grad():
-                for inputs, target, whole in feed.batches(validation_rows, batch_size):
-                    output = answer_of(inputs, kicks=with_ball(target))
-                    scores.add(loss_of(output, target, whole=whole), output.point(), target, batch=len(whole))
-                    if config.train.calibrate:
-                        calibration.add(output.raw_logits, target.kind)
-            record |= {f"validation_{name}": value for name, value in scores.table(group).items()}
-            if config.train.calibrate:
-                record["temperature"], gained = calibration.fit(group)
-                model.head.temperature.fill_(record["temperature"])
-                record["validation_cross_entropy"] -= gained
-                record["validation_loss"] -= gained
+            late = _ends_late(config.train, done=epoch - setup.done - 1, seconds=epoch_began - began)
+            if setup.group.first(partial(bool, late)):
+                break
+            record, batches = _train_epoch(setup, epoch, on_progress)
+            record["samples_per_s"] = record["samples"] / (time.monotonic() - epoch_began)
+            record |= _validate(setup)
             record["seconds"] = time.monotonic() - epoch_began
             if not (math.isfinite(record["train_loss"]) and math.isfinite(record["validation_loss"])):
-                kept = f"the checkpoints of epoch {epoch - 1} are kept" if epoch > 1 else "nothing is kept"
-                raise RunError(
-                    f"{run.path}: the loss is not a number in epoch {epoch}; {kept}; try a smaller train.learning_rate"
-                )
-            if journal:
-                journal.write(record, model, optimiser)
-            on_progress(Progress(epoch, config.train.epochs, batches, batches, record))
-    return run
+                raise _diverged(setup.run, epoch)
+            if logger:
+                logger.write(record, setup.model, setup.optimiser)
+            on_progress(Progress(epoch, epochs, batches, batches, record))
+    return setup.run
+
+
+def _train_epoch(setup: Setup, epoch: int, on_progress: Callable[[Progress], None]) -> tuple[dict[str, Any], int]:
+    """Go through the batches of an epoch; return its record so far and the number of its batches."""
+    config, model, optimiser = setup.config, setup.model, setup.optimiser
+    torch.manual_seed(_mixed(config.train.seed, epoch))
+    order, mirrored = _epoch_rows(setup, epoch)
+    batches = math.ceil(len(order) / config.data.batch_size)
+    metrics = RunningMetrics(setup.device, setup.dataset.commands)
+    model.train()
+    kicks = _extra_kicks(setup, epoch=epoch, batches=batches)
+    every = enumerate(setup.batches.batches(order, config.data.batch_size, mirrored=mirrored), 1)
+    for batch, (inputs, target, whole) in every:
+        for weights in optimiser.param_groups:
+            weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
+        answered = answer(model, inputs, precision=setup.precision, kicks=with_ball(target))
+        loss = _loss(setup, answered, Batch(inputs, target, whole), balance=setup.balance)
+        error = loss.total
+        for kick_inputs, kick_target, whole_kicks in islice(kicks, 1):
+            with torch.autocast(setup.device.type, torch.bfloat16, enabled=setup.precision == "bf16"):
+                taught = model.kick_loss(kick_inputs, kick_target, of=len(whole_kicks))
+            error = error + config.train.parameter_weight * taught
+        optimiser.zero_grad(set_to_none=True)
+        error.backward()  # type: ignore[no-untyped-call]
+        setup.group.add_up_gradients(model)
+        optimiser.step()
+        with torch.no_grad():
+            metrics.add(loss, answered.point(), target, batch=len(whole))
+        on_progress(Progress(epoch, config.train.epochs, batch, batches, None))
+    record: dict[str, Any] = {"epoch": epoch, "samples": len(order)}
+    record |= {f"train_{name}": value for name, value in metrics.table(setup.group).items()}
+    return record, batches
+
+
+@torch.no_grad()
+def _validate(setup: Setup) -> dict[str, Any]:
+    """Measure the model on the validation samples, and calibrate it on them if the settings ask for that."""
+    config, model, commands = setup.config, setup.model, setup.dataset.commands
+    model.eval()
+    metrics, calibration = RunningMetrics(setup.device, commands), Calibration(setup.device, commands)
+    for inputs, target, whole in setup.batches.batches(setup.validation_rows, config.data.batch_size):
+        answered = answer(model, inputs, precision=setup.precision, kicks=with_ball(target))
+        loss = _loss(setup, answered, Batch(inputs, target, whole))
+        metrics.add(loss, answered.point(), target, batch=len(whole))
+        if config.train.calibrate:
+            calibration.add(answered.raw_logits, target.kind)
+    record = {f"validation_{name}": value for name, value in metrics.table(setup.group).items()}
+    if config.train.calibrate:
+        record["temperature"], gained = calibration.fit(setup.group)
+        model.head.temperature.fill_(record["temperature"])
+        record["validation_cross_entropy"] -= gained
+        record["validation_loss"] -= gained
+    return record
+
+
+def _loss(setup: Setup, answered: Answer, batch: Batch, **balance: Any) -> Loss:
+    train = setup.config.train
+    loss: Loss = setup.model.loss(
+        answered,
+        batch.target,
+        parameter_loss=cast(ParameterLoss, train.parameter_loss),
+        weight=train.parameter_weight,
+        aim_weight=train.aim_weight,
+        whole=batch.whole,
+        **balance,
+    )
+    return loss
 
 
 def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kicks: Tensor | None = None) -> Answer:
@@ -229,141 +182,43 @@ def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], 
     return model.answer_inputs(inputs, kicks=kicks)
 
 
-def _kick_order(config: TrainConfig, rows: NDArray[np.int64], *, epoch: int, batches: int) -> NDArray[np.int64]:
-    """The kicks and tackles to show beside the batches of an epoch, from ``rows`` with all of them: each as often."""
+def _epoch_rows(setup: Setup, epoch: int) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:
+    """Return the samples of an epoch in their order, and which of them to mirror, None for none."""
+    data, seed = setup.config.data, setup.config.train.seed
+    chosen = epoch_order(
+        len(setup.rows),
+        seed=seed,
+        epoch=epoch - 1,
+        slice_rows=data.batches_per_epoch * data.batch_size,
+        draws=None if setup.draws is None else setup.draws[setup.kinds],
+        repeat=data.repeat,
+    )
+    order = setup.rows[chosen]
+    if not data.mirror:
+        return order, None
+    return order, epoch_mirrored(len(order), seed=seed, epoch=epoch - 1, share=data.mirror)
+
+
+def _extra_kicks(setup: Setup, *, epoch: int, batches: int) -> Iterator[Batch]:
+    """Give the kicks and tackles to show beside the batches of an epoch; each sample comes as often as any other."""
+    config = setup.config.train
+    rows = setup.rows[np.isin(setup.kinds, WITH_BALL)]
     wanted = batches * config.kicks
     if not wanted or not len(rows):
-        return rows[:0]
+        return iter(())
     random = np.random.default_rng((config.seed, 3, epoch))
-    return np.concatenate([random.permutation(rows) for _ in range(math.ceil(wanted / len(rows)))])[:wanted]
+    order = np.concatenate([random.permutation(rows) for _ in range(math.ceil(wanted / len(rows)))])[:wanted]
+    return setup.batches.batches(order, config.kicks)
 
 
-def check_commands(config: Config, dataset: Dataset, *, adapting: bool = False) -> None:
-    """See that the model answers with what the dataset has.
-
-    Raises:
-        UsageError: it does not.
-    """
-    there, answers = dataset.commands, config.model.commands
-    if answers != there:
-        remedy = f"add --set model.commands={','.join(there)}"
-        if adapting:
-            remedy = "make the dataset with the options of that of the base"
-        raise UsageError(
-            f"{dataset.path}: has the commands {', '.join(there)}, the model is for {', '.join(answers)}; {remedy}"
-        )
+def _ends_late(config: TrainConfig, *, done: int, seconds: float) -> bool:
+    """Return whether one more epoch as long as those done would end after ``max_minutes``."""
+    return bool(done and config.max_minutes and seconds + seconds / done > 60 * config.max_minutes)
 
 
-class Journal:
-    """All that the epochs of a run leave in its folder, from epoch ``done`` + 1 on."""
-
-    def __init__(self, run: Run, done: int) -> None:
-        from torch.utils.tensorboard import SummaryWriter
-
-        self.run, self.history = run, run.history()[:done]
-        write_atomic(run.metrics_path, "".join(json.dumps(record) + "\n" for record in self.history).encode())
-        self.board = SummaryWriter(str(run.path / "tensorboard"), purge_step=done + 1)
-
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.board.close()
-
-    def write(self, record: dict[str, Any], model: Clone, optimiser: Optimiser) -> None:
-        """Write an epoch. A kill before the last file repeats the epoch, which writes the same again."""
-        epoch, run = record["epoch"], self.run
-        with run.metrics_path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(record) + "\n")
-        for name, (figure, better) in BEST.items():
-            before = [past[figure] for past in self.history if figure in past]
-            if figure in record and all(better(float(record[figure]), float(value)) for value in before):
-                save_weights(run.checkpoint_path(name), model, epoch=epoch)
-        save_weights(run.checkpoint_path("last"), model, epoch=epoch)
-        self.history.append(record)
-        save_progress(run.checkpoint_path(RESUME), model, optimiser, epoch=epoch)
-        for name, value in record.items():
-            part, _, figure = name.partition("_")
-            self.board.add_scalar(f"{part}/{figure}" if part in {"train", "validation"} else name, value, epoch)
-
-
-def _check_resumable(config: Config, dataset: Dataset, run: Run) -> None:
-    """See that this config and dataset are those of the run."""
-    if dataset.id != run.dataset_id:
-        raise RunError(
-            f"{run.path}: was trained on dataset {run.dataset_id} ({run.dataset_path}), "
-            f"{dataset.path} is {dataset.id}; give the same dataset or begin a new run"
-        )
-    # Over how many epochs the cosine falls decides on every learning rate.
-    free = tuple(key for key in MAY_CHANGE if config.train.schedule == "constant" or key != "train.epochs")
-    changed = [text for text in differences(run.config, config) if text.partition(":")[0] not in free]
-    if changed:
-        raise RunError(f"{run.path}: cannot resume with other settings ({'; '.join(changed)}); begin a new run")
-
-
-def _resources(config: TrainConfig) -> tuple[torch.device, Literal["fp32", "bf16"]]:
-    """The device and the precision to train in, with ``auto`` resolved for this machine."""
-    if config.threads:
-        torch.set_num_threads(config.threads)
-    if config.device == "cuda" and not torch.cuda.is_available():
-        raise UsageError("train.device = cuda, but PyTorch finds no CUDA device here; use cpu or auto")
-    if config.device != "cpu" and torch.cuda.is_available():
-        device = torch.device("cuda", local_rank() % torch.cuda.device_count())
-        torch.cuda.set_device(device)
-    else:
-        device = torch.device("cpu")
-    bfloat = config.precision == "bf16" or (config.precision == "auto" and has_fast_bfloat16(device))
-    return device, "bf16" if bfloat else "fp32"
-
-
-def has_fast_bfloat16(device: torch.device) -> bool:
-    """Whether matrix products are faster in bfloat16: about three times on processors that have it, else slower."""
-    if device.type == "cuda":
-        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
-    able = torch.cpu.get_capabilities()
-    return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
-
-
-def balanced(
-    config: TrainConfig, counts: NDArray[np.integer], device: torch.device
-) -> tuple[NDArray[np.float32] | None, Balance | None]:
-    """How commands of unlike frequency are made up for.
-
-    Args:
-        counts: (commands,) training samples of each command.
-
-    Returns:
-        (commands,) how often a sample of each command is drawn, None for once; and what the loss needs to know, None
-        for nothing.
-    """
-    if config.balance == "none":
-        return None, None
-    # Of a command that never comes nothing is known: 1.
-    shares = counts / counts.sum()
-    factors = np.where(counts > 0, shares, 1.0) ** -config.balance_strength
-    factors = np.where(counts > 0, factors / (factors @ shares), 1.0)
-    draws = None
-    if config.balance == "oversample":
-        draws = factors.astype(np.float32)
-    elif config.balance == "undersample":
-        draws = (factors / factors[counts > 0].max()).astype(np.float32)
-    weight = torch.tensor(factors if config.balance == "weights" else np.ones_like(factors), dtype=torch.float32)
-    shift = torch.tensor(np.log(factors) if config.prior_correction else np.zeros_like(factors), dtype=torch.float32)
-    return draws, Balance(weight.to(device), shift.to(device))
-
-
-def _validation_rows(config: Config, dataset: Dataset) -> NDArray[np.int64]:
-    """The samples to validate on, always the same ones, spread over all validation matches."""
-    rows = dataset.split(Split.VALIDATION)
-    if not len(rows):
-        raise DatasetError(
-            f"{dataset.path}: no validation samples, so no checkpoint can be chosen; make it again from more matches"
-        )
-    wanted = config.data.validation_batches * config.data.batch_size
-    if not wanted or wanted >= len(rows):
-        return rows
-    chosen = np.random.default_rng((config.train.seed, 2)).choice(len(rows), wanted, replace=False)
-    return rows[np.sort(chosen)]
+def _diverged(run: Run, epoch: int) -> RunError:
+    kept = f"the checkpoints of epoch {epoch - 1} are kept" if epoch > 1 else "nothing is kept"
+    return RunError(f"{run.path}: the loss is not a number in epoch {epoch}; {kept}; try a smaller train.learning_rate")
 
 
 def learning_rate(config: TrainConfig, *, epoch: int, batch: int, batches: int) -> float:

@@ -121,7 +121,7 @@ class Run:
         """One record per finished epoch.
 
         ``epoch`` (from 1), ``samples`` trained on in it, ``samples_per_s``, ``seconds`` (with validation), and the
-        figures of `scores.Scores.table` under ``train_`` and ``validation_``: ``validation_accuracy``.
+        figures of `metrics.RunningMetrics.table` under ``train_`` and ``validation_``: ``validation_accuracy``.
         """
         if not self.metrics_path.is_file():
             return []

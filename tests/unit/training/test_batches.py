@@ -21,7 +21,7 @@ from teamclone.models.clone import Clone
 from teamclone.models.config import ModelConfig
 from teamclone.models.inputs.paper import PaperFeatures
 from teamclone.store import create_store
-from teamclone.training.batches import Feed, counterparts
+from teamclone.training.batches import Batches, counterparts
 from teamclone.training.gather import Gather
 from teamclone.training.group import ALONE, Group
 from teamclone.training.loop import answer
@@ -118,20 +118,20 @@ class OtherFeatures(PaperFeatures):
         return super().normalise(columns) * 2
 
 
-def as_on_a_card(feed: Feed) -> None:
+def as_on_a_card(feed: Batches) -> None:
     feed.on_card, feed.quick, feed.ahead = True, False, False
 
 
-def with_other_features(feed: Feed) -> None:
+def with_other_features(feed: Batches) -> None:
     feed.quick = False
 
 
 @pytest.mark.parametrize("way", [lambda feed: None, as_on_a_card, with_other_features])
 @pytest.mark.parametrize("size", [1, 2, 3])
-def test_shares_make_up_the_batches_in_order(made: Dataset, way: Callable[[Feed], None], size: int) -> None:
+def test_shares_make_up_the_batches_in_order(made: Dataset, way: Callable[[Batches], None], size: int) -> None:
     model = fitted(made, CONFIGS[0])
     rows = np.random.default_rng(0).permutation(len(made))[:101]
-    feeds = [Feed(made, model, CPU, Group(rank=rank, size=size)) for rank in range(size)]
+    feeds = [Batches(made, model, CPU, Group(rank=rank, size=size)) for rank in range(size)]
     for feed in feeds:
         way(feed)
     ready = [list(feed.batches(rows, 25)) for feed in feeds]
@@ -152,7 +152,7 @@ def test_other_features_are_asked_themselves(made: Dataset) -> None:
     plain = model.features(made.state(rows))
     model.features = OtherFeatures()
     model.features.load_state_dict(fitted(made, CONFIGS[0]).features.state_dict())
-    (batch,) = Feed(made, model, CPU, ALONE).batches(rows, 9)
+    (batch,) = Batches(made, model, CPU, ALONE).batches(rows, 9)
     assert torch.equal(batch.inputs, 2 * plain)
 
 
@@ -170,7 +170,7 @@ def test_mirrored_samples_among_others(made: Dataset, config: ModelConfig, kept:
     table = 4 * len(model.inputs.names)
     told: list[tuple[int, int]] = []
     feeds = [
-        Feed(
+        Batches(
             made,
             model,
             CPU,
@@ -206,8 +206,8 @@ def test_kept_inputs_are_those_made_anew(made: Dataset) -> None:
     """But for rounding, which hangs on how many are made at once."""
     model = fitted(made, RELATIVE)
     rows = np.random.default_rng(0).permutation(len(made))
-    kept = Feed(made, model, CPU, ALONE, keep_bytes=1e9, rows=rows[:500])
-    anew = Feed(made, model, CPU, ALONE, keep_bytes=0, rows=rows[:500])
+    kept = Batches(made, model, CPU, ALONE, keep_bytes=1e9, rows=rows[:500])
+    anew = Batches(made, model, CPU, ALONE, keep_bytes=0, rows=rows[:500])
     assert (kept.ahead, anew.ahead) == (False, True)
     for one, other in zip(kept.batches(rows[:300], 77), anew.batches(rows[:300], 77), strict=True):
         assert torch.allclose(one.inputs, other.inputs, rtol=1e-5, atol=1e-6)
@@ -237,7 +237,7 @@ def test_a_step_on_the_quick_way_is_a_plain_step_but_for_rounding(real: Dataset,
     rows = np.random.default_rng(1).permutation(len(real))[:n]
     gradients = []
     for plain in (True, False):
-        (batch,) = Feed(real, model, CPU, ALONE).batches(rows, n)
+        (batch,) = Batches(real, model, CPU, ALONE).batches(rows, n)
         output = model.answer(real.state(rows)) if plain else answer(model, batch.inputs, precision="fp32")
         loss = model.loss(output, real.target(rows) if plain else batch.target)
         model.zero_grad()

@@ -14,7 +14,7 @@ from teamclone.training.group import ALONE, Group
 from teamclone.world.state import Target
 
 
-class Scores:
+class RunningMetrics:
     """Sums over all samples seen so far. They stay on the device: no batch waits for a number."""
 
     def __init__(self, device: torch.device, commands: tuple[str, ...] = CLONED) -> None:

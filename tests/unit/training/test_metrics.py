@@ -6,14 +6,14 @@ import torch
 from teamclone.models.clone import Prediction
 from teamclone.models.loss import Loss
 from teamclone.rcss.commands import CLONED
-from teamclone.training.scores import Scores
+from teamclone.training.metrics import RunningMetrics
 from teamclone.world.state import Target
 
 CPU = torch.device("cpu")
 
 
 def test_figures_by_hand_over_unequal_batches() -> None:
-    scores = Scores(CPU)
+    scores = RunningMetrics(CPU)
     one_hot = torch.eye(4)
     # Truth dash, dash, turn; said dash, kick, turn. Dash power predicted 100 for 50, else zeros.
     scores.add(
@@ -48,7 +48,7 @@ def test_figures_by_hand_over_unequal_batches() -> None:
 
 def test_further_commands_are_counted() -> None:
     """A move of 57.5 m where -57.5 was right, beside a cycle without a command."""
-    scores = Scores(CPU, (*CLONED, "move", "none"))
+    scores = RunningMetrics(CPU, (*CLONED, "move", "none"))
     said = torch.zeros(2, 8)
     said[0, 6] = 57.5
     scores.add(

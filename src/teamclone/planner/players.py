@@ -47,16 +47,18 @@ class Allowance(NamedTuple):
 
     Attributes:
         touch_m: metres beyond its reach within which an opponent that only drifts has the ball.
-        reach: part of its reach that shortens its dashes.
+        reach: part of its reach that shortens its dashes; reach_from: the first cycle in which it does.
         ahead_m: metres that shorten them, too; unsure: more of them per metre between the opponent and the actor.
         turn_m: metres by which the reach is wider where it decides on a turn.
         back_m: metres within which it dashes backwards instead of turning.
         behind_m: how far it may be behind the ball and still come, seen along the path of the ball.
         early: cycles that it is thought to be earlier; early_x, earlier_x: one more before each of these x.
+        bound: 1 where it must not be so early that it would run faster than it can, else 0.
     """
 
     touch_m: float = 0.0
     reach: float = 1.0
+    reach_from: float = 1.0
     ahead_m: float = 0.0
     unsure: float = 0.0
     turn_m: float = 0.0
@@ -65,18 +67,18 @@ class Allowance(NamedTuple):
     early: float = 0.0
     early_x: float = -math.inf
     earlier_x: float = -math.inf
+    bound: float = 0.0
 
 
-RECEIVER = Allowance(touch_m=-math.inf, reach=0.0)
 PASS = Allowance(touch_m=0.15, ahead_m=0.5)
 LONG_PASS = Allowance(touch_m=0.15, ahead_m=0.2)
 BOLD_PASS = Allowance(touch_m=0.15)
 DRIBBLE = Allowance(reach=0.5, ahead_m=0.2, behind_m=-4.0, early_x=30.0, earlier_x=0.0)
-SELF_PASS = Allowance(ahead_m=0.2, unsure=0.01, behind_m=-4.0)
-SELF_PASS_AHEAD = Allowance(ahead_m=0.2, unsure=0.01, behind_m=-4.0, early=1.0, early_x=27.0)
-SHOT = Allowance(reach=0.8, early=-1.0)
-SHOT_GOALKEEPER = Allowance(touch_m=0.15, reach=0.9, unsure=0.02, turn_m=0.1)
-TACKLE = Allowance(ahead_m=0.5, back_m=5.0)
+SELF_PASS = Allowance(ahead_m=0.2, unsure=0.01, behind_m=-4.0, bound=1.0)
+SELF_PASS_AHEAD = Allowance(ahead_m=0.2, unsure=0.01, behind_m=-4.0, early=1.0, early_x=27.0, bound=1.0)
+SHOT = Allowance(reach=0.8, reach_from=2.0, early=-1.0)
+SHOT_GOALKEEPER = Allowance(touch_m=0.15, reach=0.9, reach_from=2.0, unsure=0.02, turn_m=0.1)
+TACKLE = Allowance(reach_from=2.0, ahead_m=0.5, back_m=5.0)
 
 
 @kernel
@@ -129,9 +131,11 @@ def arrival(scene: Array, player: Array, place: tuple[float, float], cycle: int,
     metres, reach = math.hypot(way_x, way_y), reach_of(player, place[0], place[1])
     if metres < reach + allowance.touch_m + HARDLY_M:
         return 0
-    dash_m = metres - allowance.reach * reach - allowance.ahead_m - allowance.unsure * player[AWAY]
+    dash_m = metres - allowance.unsure * player[AWAY]
+    if cycle >= allowance.reach_from:
+        dash_m -= allowance.reach * reach + allowance.ahead_m
     early = allowance.early + (place[0] < allowance.early_x) + (place[0] < allowance.earlier_x)
-    if dash_m > player[TOP] * (cycle + early + 2.0):
+    if dash_m > player[TOP] * (cycle + early + 2.0) or allowance.bound * (metres - reach) > player[TOP] * cycle:
         return NEVER_CYCLES
     off = abs(turned(direction(way_x, way_y) - player[BODY]))
     if metres < allowance.back_m:

@@ -13,7 +13,6 @@ from teamclone.planner.motion import S_X, S_Y, dash, drift, motion_of, spare
 from teamclone.planner.players import (
     SELF_PASS,
     SELF_PASS_AHEAD,
-    after_dash,
     arrival,
     reach_of,
     seen_from,
@@ -73,7 +72,7 @@ def _overtaken(scene: Array, place: tuple[float, float], path: Path, cycles: int
         reach = reach_of(player, next_ball[0], next_ball[1])
         if math.hypot(ahead, aside) < reach + AT_ONCE_M:
             return True
-        if ahead > 0 and after_dash(ahead, aside, player[DASH_ACCEL]) < reach:
+        if math.hypot(ahead - player[DASH_ACCEL], aside) < reach:
             return True
         before, _ = along(player[X] - ball[X], player[Y] - ball[Y], path.cos, path.sin)
         allowance = SELF_PASS_AHEAD if before > IN_THE_WAY_M else SELF_PASS

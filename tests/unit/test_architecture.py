@@ -55,8 +55,6 @@ TORCH_FOR_NOW = {"planner.plan"}
 
 MOST_LINES = 80
 TOO_LONG_FOR_NOW = {
-    "cli.search.search",
-    "logs.rcg_text.read_text",
     "training.loop.train",
 }
 KERNEL = re.compile(r"_?(njit|kernel|helper)\b")

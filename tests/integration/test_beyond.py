@@ -19,7 +19,8 @@ from teamclone.evaluation.evaluate import evaluate
 from teamclone.evaluation.report import make_report
 from teamclone.logs import read_match
 from teamclone.rcss.commands import CLONED, REPERTOIRE
-from teamclone.search.search import Mode, SearchConfig, search
+from teamclone.search.run import search
+from teamclone.search.trials import Mode, SearchConfig
 from teamclone.store import create_store
 from teamclone.training.adapt import adaptation
 from teamclone.training.config import Config, load_config

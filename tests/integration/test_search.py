@@ -22,7 +22,9 @@ from teamclone.cli import main
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import RunError
-from teamclone.search.search import Mode, Search, SearchConfig, Status, Study, open_search, search
+from teamclone.search.run import search
+from teamclone.search.strategies import Study
+from teamclone.search.trials import Mode, Search, SearchConfig, Status, open_search
 from teamclone.training.config import load_config, override
 from teamclone.training.loop import train
 from teamclone.training.run import open_run

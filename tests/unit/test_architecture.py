@@ -1,7 +1,4 @@
-"""The plan of the package: which folder may import which, how long a function may be, where server defaults stand.
-
-Lists that end in FOR_NOW hold what still breaks a rule. They are strict: an entry that breaks it no longer fails.
-"""
+"""The plan of the package: which folder may import which, how long a function may be, where server defaults stand."""
 
 from __future__ import annotations
 
@@ -46,22 +43,15 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""
 
-ARROWS_FOR_NOW: set[str] = set()
 
 MAY_IMPORT_TORCH = ("world.state", "world.mirror", "dataset.reader", "models", "training", "search", "evaluation")
-TORCH_FOR_NOW: set[str] = set()
 
 MOST_LINES = 80
-TOO_LONG_FOR_NOW = {
-    "cli.search.search",
-    "logs.rcg_text.read_text",
-}
 KERNEL = re.compile(r"_?(njit|kernel|helper)\b")
 """Decorators by which Numba compiles a function. It inlines no call, so a kernel may be long."""
 
 TELLING_DEFAULTS = (0.94, 130600, 0.085)
 """Defaults of the server that are no other number of the game: ball_decay, stamina_capacity, ball_size."""
-DEFAULTS_FOR_NOW: set[str] = set()
 
 
 @cache
@@ -117,12 +107,6 @@ def is_within(module: str, places: tuple[str, ...]) -> bool:
     return any(module == place or module.startswith(f"{place}.") for place in places)
 
 
-def strict(found: set[str], for_now: set[str], advice: str) -> None:
-    """Nothing breaks the rule but what is listed, and all of that does."""
-    assert not found - for_now, f"{sorted(found - for_now)}: {advice}"
-    assert not for_now - found, f"{sorted(for_now - found)}: is in order now; take it off the list"
-
-
 def test_every_folder_is_in_the_plan() -> None:
     unknown = {folder_of(module) for module in modules()} - set(MAY_IMPORT)
     assert not unknown, f"{sorted(unknown)}: add it to MAY_IMPORT, with what it may import, and to ARCHITECTURE.md"
@@ -146,7 +130,7 @@ def test_a_folder_imports_only_what_the_plan_allows() -> None:
         "the plan has no such arrow. Move what is needed into a folder that both may import; where the plan is wrong, "
         "change MAY_IMPORT and ARCHITECTURE.md"
     )
-    strict(arrows, ARROWS_FOR_NOW, advice)
+    assert not arrows, f"{sorted(arrows)}: " + advice
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
@@ -166,7 +150,7 @@ def test_only_what_works_on_tensors_imports_torch() -> None:
         if any(folder_of(name) == "torch" for name in imports(module, tree, known))
         and not is_within(module, MAY_IMPORT_TORCH)
     }
-    strict(found, TORCH_FOR_NOW, "must do without torch; else put it into a module of MAY_IMPORT_TORCH")
+    assert not found, f"{sorted(found)}: " + "must do without torch; else put it into a module of MAY_IMPORT_TORCH"
 
 
 def too_long(tree: ast.Module) -> set[str]:
@@ -182,7 +166,7 @@ def too_long(tree: ast.Module) -> set[str]:
 
 def test_a_function_fits_on_a_screen() -> None:
     found = {f"{module}.{name}" for module, tree in modules().items() for name in too_long(tree)}
-    strict(found, TOO_LONG_FOR_NOW, f"over {MOST_LINES} lines; split it into functions with names of their own")
+    assert not found, f"{sorted(found)}: " + f"over {MOST_LINES} lines; split it into functions with names of their own"
 
 
 def server_defaults(tree: ast.Module) -> set[str]:
@@ -208,7 +192,7 @@ def test_defaults_of_the_server_stand_in_one_place() -> None:
         for what in server_defaults(tree)
     }
     advice = "take it from the match, with rcss.server_params.number or vector; the defaults stand there alone"
-    strict(found, DEFAULTS_FOR_NOW, advice)
+    assert not found, f"{sorted(found)}: " + advice
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +14,7 @@ from teamclone.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from teamclone.search.search import Search, Trial
+    from teamclone.search.trials import Search, Trial
 
 
 def search(
@@ -58,49 +57,48 @@ def search(
     base = load_config(preset, overrides or [])
 
     from teamclone.dataset.reader import open_dataset
-    from teamclone.search import search as library
+    from teamclone.search.run import search as run_search
+    from teamclone.search.trials import Objective, SearchConfig, Status
 
-    kind = choice(library.Mode, mode, option="--mode")
-    given: dict[str, Any] = {
-        name: value
-        for name, value in {
-            "beam": beam,
-            "iterations": iterations,
-            "smallest": smallest,
-            "largest": largest,
-            "start": tuple(map(_widths, start)) if start else None,
-            "trials": trials,
-        }.items()
-        if value is not None
+    options: dict[str, Any] = {
+        "beam": beam,
+        "iterations": iterations,
+        "smallest": smallest,
+        "largest": largest,
+        "trials": trials,
     }
-    foreign = [f"--{name}" for name in given if name not in library.OPTIONS[kind]]
-    if foreign:
-        raise UsageError(f"--mode {kind} has no {', '.join(foreign)}; leave it out")
-    config = library.SearchConfig(
-        mode=kind,
+    options["start"] = tuple(map(_widths, start)) if start else None
+    config = SearchConfig(
         base=base,
         held=tuple(sorted({text.partition("=")[0].strip() for text in overrides or []})),
-        objective=choice(library.Objective, objective, option="--objective"),
-        **given,
+        objective=choice(Objective, objective, option="--objective"),
+        **_of_mode(mode, options),
     )
-    # Their lack is told before hours of training, not after.
-    for module in ("matplotlib", *(("optuna",) if kind is library.Mode.STUDY else ())):
-        import_module(module)
     opened = open_dataset(dataset)
     try:
         with progress("search") as bar:
             report = _bar(bar.add_task("", total=None), bar.update) if not bar.disable else _lines()
-            found = library.search(config, opened, out, jobs=jobs, on_progress=report)
+            found = run_search(config, opened, out, jobs=jobs, on_progress=report)
     except KeyboardInterrupt:
         fail(f"interrupted; all finished trials and epochs are kept in {out}; give the same command to go on", code=130)
-
-    from teamclone.search.figure import write_figure
-
-    if any(trial.figures for trial in found.trials):
-        write_figure(found)
     _summary(found, as_json=as_json)
-    if not any(trial.status is library.Status.FINISHED for trial in found.trials):
+    if not any(trial.status is Status.FINISHED for trial in found.trials):
         fail(f"{out}: every trial failed, the first with: {found.trials[0].error}", code=1)
+
+
+def _of_mode(mode: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the mode and the options that were given.
+
+    Raises:
+        UsageError: there is no such mode, or it does not have one of the options.
+    """
+    from teamclone.search.trials import OPTIONS, Mode
+
+    kind = choice(Mode, mode, option="--mode")
+    given = {name: value for name, value in options.items() if value is not None}
+    if foreign := [f"--{name}" for name in given if name not in OPTIONS[kind]]:
+        raise UsageError(f"--mode {kind} has no {', '.join(foreign)}; leave it out")
+    return {"mode": kind, **given}
 
 
 def _widths(text: str) -> tuple[int, ...]:
@@ -111,7 +109,7 @@ def _widths(text: str) -> tuple[int, ...]:
 
 
 def _settled(search: Search) -> list[Trial]:
-    from teamclone.search.search import SETTLED
+    from teamclone.search.trials import SETTLED
 
     return [trial for trial in search.trials if trial.status in SETTLED]
 
@@ -120,7 +118,7 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
     """Progress as a bar, one step a trial; of a beam search the trials of the next step are not known yet."""
 
     def report(search: Search) -> None:
-        from teamclone.search.search import Mode, Status
+        from teamclone.search.trials import Mode, Status
 
         running = [
             f"{trial.name} epoch {len(trial.curve) + 1}" for trial in search.trials if trial.status is Status.RUNNING
@@ -161,7 +159,7 @@ def _line(trial: Trial) -> str:
 def _summary(search: Search, *, as_json: bool) -> None:
     from dataclasses import asdict
 
-    from teamclone.search.search import Mode
+    from teamclone.search.trials import Mode
 
     ranked = search.ranked()
     if as_json:

@@ -59,28 +59,10 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
         if match := _PLAYMODE.match(line):
             mode = BY_NAME.get(match[2].decode())
             if mode is None:
-                problems.append(
-                    Problem(
-                        code="unknown-playmode",
-                        severity=Severity.WARNING,
-                        text=f"play mode {match[2].decode()!r} is unknown, kept as 0",
-                        path=path,
-                        line=int(index) + 1,
-                        cycle=int(match[1]),
-                    )
-                )
+                problems.append(_unknown_mode(match, path=path, line=int(index) + 1))
             modes.append((frame, int(mode or 0)))
         elif match := _TEAM.match(line):
-            left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
-            scores = [min(int(value or 0), _MAX_SCORE) for value in match.groups()[3:]]
-            teams.append(
-                TeamMark(
-                    frame=frame,
-                    left=left,
-                    right=right,
-                    scores=(scores[0], scores[1], scores[2], scores[3], scores[4], scores[5]),
-                )
-            )
+            teams.append(_team_mark(frame, match))
         elif line.startswith(b"(msg "):
             finished = finished or b'"(result ' in line
         elif line.startswith(b"(server_param "):
@@ -119,6 +101,29 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
         player_params=player_params,
         complete=finished,
         problems=tuple(problems),
+    )
+
+
+def _unknown_mode(match: re.Match[bytes], *, path: Path | None, line: int) -> Problem:
+    return Problem(
+        code="unknown-playmode",
+        severity=Severity.WARNING,
+        text=f"play mode {match[2].decode()!r} is unknown, kept as 0",
+        path=path,
+        line=line,
+        cycle=int(match[1]),
+    )
+
+
+def _team_mark(frame: int, match: re.Match[bytes]) -> TeamMark:
+    """Return names and scores of a ``(team ...)`` line, which hold from ``frame`` on."""
+    left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
+    scores = [min(int(value or 0), _MAX_SCORE) for value in match.groups()[3:]]
+    return TeamMark(
+        frame=frame,
+        left=left,
+        right=right,
+        scores=(scores[0], scores[1], scores[2], scores[3], scores[4], scores[5]),
     )
 
 

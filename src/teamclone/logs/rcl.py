@@ -16,8 +16,6 @@ from teamclone.logs.rcg_text import count_byte, line_bounds
 FIRST_LINE = re.compile(rb"\s*\d{1,9}(,\d{1,9})?\t")
 """What a command log begins with."""
 _SENDER = re.compile(rb"^\d+(?:,\d+)?\tRecv (\S+)_(?:\d{1,2}|Coach): ", re.MULTILINE)
-_ODD = 2
-_STRANGER = 3
 
 
 def read_commands(data: bytes, *, left: str | None, right: str | None, path: Path | None = None) -> CommandLog:
@@ -126,7 +124,7 @@ def _problems(
     path: Path | None,
 ) -> list[Problem]:
     problems = []
-    odd = np.flatnonzero(classes == _ODD)
+    odd = np.flatnonzero(classes == scan.LINE_ODD)
     if len(odd) and odd[-1] == len(starts) - 1 and stops[odd[-1]] == len(data):
         cut = True
         odd = odd[:-1]
@@ -151,7 +149,7 @@ def _problems(
                 line=int(odd[0]) + 1,
             )
         )
-    strangers = np.flatnonzero(classes == _STRANGER)
+    strangers = np.flatnonzero(classes == scan.LINE_STRANGER)
     if len(strangers):
         first = int(strangers[0])
         names = sender_names(data[starts[first] : stops[first]])

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from teamclone.logs.columns import COUNTERS, PLAYERS
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.system.compiling import tell_when_compiled
@@ -25,25 +26,13 @@ Bytes = NDArray[np.uint8]
 
 _POWERS = 10.0 ** np.arange(23)
 
-# Where the float columns of a player stand in the array that scan_shows fills.
-PLAYER_FLOATS = (
-    "x",
-    "y",
-    "vx",
-    "vy",
-    "body",
-    "neck",
-    "pointto_x",
-    "pointto_y",
-    "view_width",
-    "focus_distance",
-    "focus_direction",
-    "stamina",
-    "effort",
-    "recovery",
-    "capacity",
-)
-N_COUNTERS = 12
+PLAYER_FLOATS = tuple(column.name for column in PLAYERS if column.dtype == "float32")
+"""Where the float columns of a player stand in the array that scan_shows fills."""
+_VIEW_WIDTH = PLAYER_FLOATS.index("view_width")
+_FOCUS = PLAYER_FLOATS.index("focus_distance")
+_STAMINA = PLAYER_FLOATS.index("stamina")
+_CAPACITY = PLAYER_FLOATS.index("capacity")
+N_COUNTERS = len(COUNTERS)
 
 # Outcomes of a show line.
 OK = 0
@@ -387,11 +376,11 @@ def _scan_player(
             value, after = _number(buffer, _blank(buffer, at + 1, stop), stop)
             if after < 0:
                 return at, -BAD_NUMBER
-            floats[8, frame, slot] = value
+            floats[_VIEW_WIDTH, frame, slot] = value
             position = after
         elif tag == 102 and second == 112:  # fp: focus point
             position += 2
-            for index in range(9, 11):
+            for index in range(_FOCUS, _FOCUS + 2):
                 value, after = _number(buffer, _blank(buffer, position, stop), stop)
                 if after < 0:
                     return position, -BAD_NUMBER
@@ -399,9 +388,9 @@ def _scan_player(
                 position = after
         elif tag == 115:  # s: stamina, effort, recovery and, from version 5, capacity
             position += 1
-            for index in range(11, 15):
+            for index in range(_STAMINA, _CAPACITY + 1):
                 at = _blank(buffer, position, stop)
-                if index == 14 and at < stop and _byte(buffer, at) == 41:
+                if index == _CAPACITY and at < stop and _byte(buffer, at) == 41:
                     break
                 value, after = _number(buffer, at, stop)
                 if after < 0:
@@ -841,8 +830,8 @@ def _scan_command(
 # What a line of a command log is.
 _LINE_OTHER = 0
 _LINE_REFEREE = 1
-_LINE_ODD = 2
-_LINE_STRANGER = 3
+LINE_ODD = 2
+LINE_STRANGER = 3
 
 _RECEIVED = np.uint64(int.from_bytes(b"Recv ", "little"))
 
@@ -931,7 +920,7 @@ def scan_commands(
             continue
         cycle, stoppage, position = _stamp(buffer, starts[line], stop)
         if position < 0:
-            line_classes[line] = _LINE_ODD
+            line_classes[line] = LINE_ODD
             continue
         line_stamps[line, 0] = cycle
         line_stamps[line, 1] = stoppage
@@ -944,7 +933,7 @@ def scan_commands(
         position = _find(buffer, name_start, stop, 32)
         colon = position - 1
         if colon <= name_start or _byte(buffer, colon) != 58:
-            line_classes[line] = _LINE_ODD
+            line_classes[line] = LINE_ODD
             continue
         underscore = colon - 1
         while underscore > name_start and _byte(buffer, underscore) != 95:
@@ -960,7 +949,7 @@ def scan_commands(
                     break
                 number = number * 10 + (_byte(buffer, at) - 48)
             if numeric and (colon == underscore + 1 or not 1 <= number <= N_TEAM):
-                line_classes[line] = _LINE_ODD
+                line_classes[line] = LINE_ODD
                 continue
             unum = number if numeric else 0
             if _same(buffer, name_start, underscore, left):
@@ -968,7 +957,7 @@ def scan_commands(
             elif _same(buffer, name_start, underscore, right):
                 side = -1
             else:
-                line_classes[line] = _LINE_STRANGER
+                line_classes[line] = LINE_STRANGER
                 continue
         position += 1
         broken = False

@@ -14,7 +14,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from teamclone.plots.style import LIGHT, style
-from teamclone.search.search import OPTIMISERS, RATES, Beam, Mode, Search, Status, Trial
+from teamclone.search.strategies import OPTIMISERS, RATES, Beam
+from teamclone.search.trials import Mode, Search, Status, Trial
 from teamclone.system.files import write_atomic
 
 INK, MUTED, FAINT, ACCENT, SECOND = LIGHT.ink, LIGHT.muted, "#b9c3cd", LIGHT.accent, LIGHT.second

@@ -19,7 +19,7 @@ def write_document(path: Path, document: dict[str, Any]) -> None:
 
 
 def document_bytes(document: dict[str, Any]) -> bytes:
-    """Lay a document out: objects over many lines, lists on one, so that it is readable and a diff shows what changed.
+    """Lay a document out: objects over many lines, numbers of a list on one, so that a diff shows what changed.
 
     Raises:
         ValueError: a number is not finite.
@@ -28,11 +28,14 @@ def document_bytes(document: dict[str, Any]) -> bytes:
 
 
 def _layout(value: Any, indent: str = "") -> str:
+    inner = indent + " "
+    if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+        lines = [f"{inner}{json.dumps(item, ensure_ascii=False, allow_nan=False, default=str)}" for item in value]
+        return "[\n" + ",\n".join(lines) + f"\n{indent}]"
     if not isinstance(value, dict) or not value:
         return json.dumps(value, ensure_ascii=False, allow_nan=False, default=str)
     if set(value) == {"value", "low", "high"}:
         return json.dumps(value, ensure_ascii=False, allow_nan=False)
-    inner = indent + " "
     lines = [
         f"{inner}{json.dumps(str(key), ensure_ascii=False)}: {_layout(item, inner)}" for key, item in value.items()
     ]

@@ -12,16 +12,13 @@ import pytest
 
 from teamclone.errors import RunError, UsageError
 from teamclone.models.config import ACTIVATIONS
-from teamclone.search.search import (
-    Beam,
+from teamclone.search.strategies import Beam, Optimisers, Strategy, Study
+from teamclone.search.trials import (
     Mode,
     Objective,
-    Optimisers,
-    Plan,
     Search,
     SearchConfig,
     Status,
-    Study,
     Trial,
     open_search,
     rank,
@@ -46,7 +43,7 @@ def finish(trial: Trial, accuracy: float, *, weights: float = 0) -> Trial:
     return trial
 
 
-def searched(plan: Plan, accuracy: Callable[[Hidden], float], trials: list[Trial] | None = None) -> list[Trial]:
+def searched(plan: Strategy, accuracy: Callable[[Hidden], float], trials: list[Trial] | None = None) -> list[Trial]:
     """All trials of a beam search in which every architecture is as accurate as a function says."""
     trials = [] if trials is None else trials
     while found := plan.propose(trials):

@@ -112,7 +112,7 @@ class State(NamedTuple):
     def each(self) -> State:
         """Return the same samples with a frame of its own for each."""
         frames = [part.index_select(0, self.frame) for part in self[: self._fields.index("frame")]]
-        return State._make([*frames, torch.arange(len(self.frame), device=self.frame.device), self.actor])
+        return State._make([*frames, torch.arange(self.frame.shape[0], device=self.frame.device), self.actor])
 
     def to(self, device: torch.device) -> State:
         """Return the state in the memory of a device."""

@@ -67,7 +67,7 @@ def reach_ball(state: State, *, held: Tensor) -> Reach:
         held: (batch,) bool, the ball is under an opponent's control and is taken to stay.
     """
     if torch.compiler.is_exporting():  # each sample by itself: what is shared depends on the data
-        cases, place = 2 * state.frame + held, torch.arange(len(state.actor), device=held.device)
+        cases, place = 2 * state.frame + held, torch.arange(state.actor.shape[0], device=held.device)
     else:
         cases, place = torch.unique(2 * state.frame + held, return_inverse=True)
     ours = _Cases(state, frame=cases // 2, held=cases % 2 == 1)

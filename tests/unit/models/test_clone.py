@@ -323,9 +323,13 @@ class Exported(torch.nn.Module):
 def test_the_preset_best_can_be_exported_for_any_batch() -> None:
     model = Exported(Clone(load_config("best").model).eval())
     batch = torch.export.Dim("batch", min=1)
-    exported = torch.export.export(model, situations(3)[:4], dynamic_shapes=({0: batch},) * 4).module()
-    for n in (1, 3, 17):
+
+    def tensors(n: int) -> tuple[Tensor, ...]:
         state = situations(n, seed=n)
-        for one, other in zip(exported(*state[:4]), model(*state[:4]), strict=True):
+        return state.ball, state.players, state.types, state.actor
+
+    exported = torch.export.export(model, tensors(3), dynamic_shapes=({0: batch},) * 4).module()
+    for n in (1, 3, 17):
+        for one, other in zip(exported(*tensors(n)), model(*tensors(n)), strict=True):
             assert one.shape[0] == n
             assert torch.allclose(one, other, atol=1e-2)

@@ -140,7 +140,7 @@ def test_a_player_alone_passes_to_itself() -> None:
     # The ball starts half a metre ahead of him: it has to be passed.
     back = scene(x=-10.5)
     assert rolled(back, "self_pass", 8) == pytest.approx((-10.5 + dashed(7), 0.0), abs=1e-3)
-    assert planned(back)["dribble_value"] < 0 < planned(back)["run_value"]
+    assert planned(back)["dribble_value"] < 0 < planned(back)["self_pass_value"]
 
 
 def test_who_is_tired_runs_less() -> None:

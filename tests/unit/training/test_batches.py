@@ -77,7 +77,7 @@ def test_what_a_log_lacks_is_not_a_number_in_the_same_places(
     detail[rng.random(detail.shape) < 0.1] = MISSING
     ball[rng.random(ball.shape) < 0.1] = np.nan
     lacking = open_dataset(
-        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/detail": detail, "frames/ball": ball})
+        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/measured": detail, "frames/ball": ball})
     )
     model = fitted(made, config)
     rows = np.arange(len(lacking))
@@ -225,7 +225,7 @@ def test_counterparts_follow_from_where_players_stand(made: Dataset, tmp_path: P
     position[60:, 1] = (0, 40)
     code[60:, 1, CATEGORICAL_INDEX["flags"]] = 0
     placed = open_dataset(
-        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/position": position, "frames/code": code})
+        make_dataset(tmp_path / "ds", frames_per_match=30, **{"frames/position": position, "frames/categorical": code})
     )
     assert counterparts(placed, np.arange(len(placed)))[:5].tolist() == [0, 2, 1, 4, 3]
 

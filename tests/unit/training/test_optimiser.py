@@ -25,7 +25,8 @@ def clone(*settings: str) -> tuple[Clone, Muon]:
 def learn(model: Clone, stepper: Muon) -> None:
     stepper.zero_grad()
     hidden = model.trunk(torch.linspace(-1, 1, 50 * 119).reshape(50, 119).sin())
-    sum(output.square().sum() for output in model.head(hidden)).backward()
+    answer = model.head(hidden)
+    (answer.raw_logits.square().sum() + answer.projected.square().sum()).backward()
     stepper.step()
 
 

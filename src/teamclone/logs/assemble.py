@@ -34,6 +34,10 @@ class TeamMark:
     scores: tuple[int, int, int, int, int, int]
 
 
+MAX_SCORE = 32767
+"""The greatest score that its column holds."""
+
+
 def stoppage_of(cycle: NDArray[np.int32]) -> NDArray[np.int32]:
     """How often each cycle was seen just before: ``[7 7 7 8]`` gives ``[0 1 2 0]``. Shape (n_frames,).
 
@@ -89,6 +93,17 @@ def frame_columns(
     for index, name in enumerate(("ball_x", "ball_y", "ball_vx", "ball_vy")[: ball.shape[1]]):
         made[name][:] = ball[:, index]
     return made
+
+
+def limited_score(value: float) -> int:
+    """Return a score or count of penalties as its column can hold it, whatever a damaged log says.
+
+    Raises:
+        ValueError: it is not a number.
+    """
+    if math.isnan(value):
+        raise ValueError("a score is no number")
+    return int(min(max(value, 0), MAX_SCORE))
 
 
 def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:

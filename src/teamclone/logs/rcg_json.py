@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import columns
-from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
+from teamclone.logs.assemble import (
+    TeamMark,
+    checked_type,
+    final_teams,
+    frame_columns,
+    limited_score,
+    player_type_columns,
+)
 from teamclone.logs.match import Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.playmodes import BY_NAME, PlayMode
@@ -281,12 +288,12 @@ def _team_mark(frame: int, body: Record) -> TeamMark:
         left=left["name"],
         right=right["name"],
         scores=(
-            int(left["score"]),
-            int(right["score"]),
-            int(left.get("pen_score", 0)),
-            int(left.get("pen_miss", 0)),
-            int(right.get("pen_score", 0)),
-            int(right.get("pen_miss", 0)),
+            limited_score(left["score"]),
+            limited_score(right["score"]),
+            limited_score(left.get("pen_score", 0)),
+            limited_score(left.get("pen_miss", 0)),
+            limited_score(right.get("pen_score", 0)),
+            limited_score(right.get("pen_miss", 0)),
         ),
     )
 

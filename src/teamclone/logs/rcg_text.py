@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from teamclone.errors import LogError
 from teamclone.logs import scan
-from teamclone.logs.assemble import TeamMark, checked_type, final_teams, frame_columns, player_type_columns
+from teamclone.logs.assemble import (
+    TeamMark,
+    checked_type,
+    final_teams,
+    frame_columns,
+    limited_score,
+    player_type_columns,
+)
 from teamclone.logs.match import Columns, GameLog, Problem, Severity
 from teamclone.logs.shows import read_shows
 from teamclone.rcss.playmodes import BY_NAME
@@ -19,7 +26,6 @@ from teamclone.rcss.playmodes import BY_NAME
 _PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')
 _TEAM = re.compile(rb"\(team (\d+) (\S+) (\S+) (-?\d+) (-?\d+)(?: (\d+) (\d+) (\d+) (\d+))?\)\s*$")
 _PLAYMODE = re.compile(rb"\(playmode (\d+) (\w+)\)\s*$")
-_MAX_SCORE = 32767
 _PIECE = 1 << 17
 
 _WHAT = {
@@ -118,7 +124,7 @@ def _unknown_mode(match: re.Match[bytes], *, path: Path | None, line: int) -> Pr
 def _team_mark(frame: int, match: re.Match[bytes]) -> TeamMark:
     """Return names and scores of a ``(team ...)`` line, which hold from ``frame`` on."""
     left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
-    scores = [min(int(value or 0), _MAX_SCORE) for value in match.groups()[3:]]
+    scores = [limited_score(int(value or 0)) for value in match.groups()[3:]]
     return TeamMark(
         frame=frame,
         left=left,

@@ -24,7 +24,8 @@ def document_bytes(document: dict[str, Any]) -> bytes:
     Raises:
         ValueError: a number is not finite.
     """
-    return f"{_layout(document)}\n".encode()
+    # A name of a file may hold bytes that are no text; JSON can escape them.
+    return f"{_layout(document)}\n".encode("utf-8", "backslashreplace")
 
 
 def _layout(value: Any, indent: str = "") -> str:

@@ -77,7 +77,7 @@ def test_the_past_ends_where_the_clock_stood(match: Match) -> None:
 
 def test_server_parameters_are_those_of_the_match(match: Match) -> None:
     params = {**match.game.server_params, "ball_decay": 0.9}
-    world = view_columns(match.frames, match.players, params=params, side=1)
+    world = view_columns(match.frames, match.players, types=match.game.player_types, params=params, side=1)
     assert world.server[SERVER_FIELD["ball_decay"]] == 0.9
     assert world.server[SERVER_FIELD["ball_size"]] == 0.085
     state = State.of(world, np.array([5]), np.array([2]))

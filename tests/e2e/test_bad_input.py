@@ -108,7 +108,7 @@ def test_paths_that_do_not_exist(tmp_path: Path, args: tuple[str, ...], words: s
 
 def test_a_team_that_does_not_occur(store: Path, tmp_path: Path) -> None:
     done = teamclone("dataset", "--store", store, "--team", "HELIOS_bse", "--out", tmp_path / "x", code=2)
-    assert "did you mean 'HELIOS_base'" in one_line(done.stderr)
+    assert "did you mean HELIOS_base?" in one_line(done.stderr)
     assert not (tmp_path / "x").exists()
 
 

@@ -443,7 +443,7 @@ def test_a_value_that_a_log_lacks_is_named(dataset: Dataset, tmp_path: Path, cha
         detail[frame, :, MEASURED_INDEX["vx"]] = MISSING
     else:
         ball[frame, 2] = np.nan
-    changes = {"frames/detail": detail, "frames/ball": ball}
+    changes = {"frames/measured": detail, "frames/ball": ball}
     lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **changes))
     with pytest.raises(DatasetError, match=rf"match 0{{15}}{match} has no {channel} in its log"):
         train(tiny(), lacking, tmp_path / "run")
@@ -453,7 +453,7 @@ def test_evaluation_names_a_value_that_a_log_lacks(dataset: Dataset, tmp_path: P
     run = train(tiny(), dataset, tmp_path / "run")
     detail = dataset.frames["measured"].numpy().copy()
     detail[:, :, MEASURED_INDEX["vx"]] = MISSING
-    lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **{"frames/detail": detail}))
+    lacking = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=50, **{"frames/measured": detail}))
     with pytest.raises(DatasetError, match="has no vx in its log"):
         evaluate(run, dataset=lacking)
     with pytest.raises(DatasetError, match="has no vx in its log"):

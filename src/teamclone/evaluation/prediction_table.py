@@ -135,7 +135,7 @@ def _needed(package: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        raise TeamcloneError(f"{package} is not installed; pip install {package}") from None
+        raise TeamcloneError(f"{package} is not installed; pip install 'teamclone[frames]'") from None
 
 
 def predict_match(

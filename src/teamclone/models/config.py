@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from teamclone.rcss.commands import CLONED
 
 FEATURE_SETS = ("paper", "relative")
-"""Sets of inputs; the modules are `features.PaperFeatures` and `relative.RelativeFeatures`."""
+"""Sets of inputs; the modules are `inputs.paper.PaperFeatures` and `inputs.egocentric.EgocentricFeatures`."""
 BLOCKS = (
     "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
     "mode",
 )  # fmt: skip
-"""Blocks of the relative inputs, in the order of their columns; see `relative.RelativeFeatures`."""
+"""Blocks of the relative inputs, in the order of their columns; see `inputs.egocentric.EgocentricFeatures`."""
 HEADS = ("point", "mixture")
 """Forms of the answer: the paper's point, or a distribution of every parameter."""
 ATTENTION_HEADS = 4
-"""Of `crowd.PlayerEncoder`."""
+"""Heads of attention in `layers.players.PlayerEncoder`."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
 """Hidden activations."""
 
@@ -31,13 +31,13 @@ class ModelConfig:
         all_types: groups of type parameters to add for all 22 players: movement, kick, stamina. Only of the paper's.
         blocks: blocks that decide on the command, see `BLOCKS`. Only of the relative inputs, as all that follows.
         kick_blocks: blocks that decide where a kick goes.
-        aims: places on the pitch that the network supposes a player to make for; see `aims.TargetPoints`.
+        aims: places on the pitch that the network supposes a player to make for; see `layers.targets.TargetPoints`.
         aim_hidden: widths of the layers that find them.
         parameter_hidden: widths of the layers that find power and direction of dashes and turns.
         kick_hidden: widths of the layers that decide where a kick goes.
         kick_dropout: `dropout` of these, of which there are few examples.
-        kick_attention: numbers by which each other player is known to these; see `crowd.PlayerEncoder`. A multiple of
-            ATTENTION_HEADS; 0 for no such layers.
+        kick_attention: numbers by which each other player is known to these; see `layers.players.PlayerEncoder`.
+            A multiple of ATTENTION_HEADS; 0 for no such layers.
         hidden: widths of the hidden layers.
         activation: see `ACTIVATIONS`.
         dropout: share of the hidden units left out at random in training.

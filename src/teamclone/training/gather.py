@@ -1,7 +1,7 @@
 """The paper's inputs straight from the arrays of a dataset, in one compiled pass.
 
 `Dataset.state` gathers every channel of every player, most of which these inputs do not ask for. The arithmetic here is
-that of `features.PaperFeatures`, in the same order, so that the same bits come out; a test holds them together.
+that of `inputs.paper.PaperFeatures`, in the same order, so that the same bits come out; a test holds them together.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def kick_for(wanted: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class Planned(nn.Module):
-    """Components of power and direction of a kick, one for each way that a plan knows (`planning.plan`).
+    """Components of power and direction of a kick, one for each way that a plan knows (`planner.plan`).
 
     Attributes:
         error: (WAYS,) logarithm of the velocities by which kicks miss what was planned, in USUAL_ERROR.

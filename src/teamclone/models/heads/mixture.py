@@ -172,17 +172,17 @@ class MixtureAnswer(Answer):
 class MixtureHead(nn.Module):
     """Command probabilities, and for each command a distribution of its parameters.
 
-    Components hang on what a player may want: to face the ball, where he meets it or where he makes for; to come to
-    rest there; to spend a multiple of what he recovers; to kick as `kicks.Kicks` says. The network gives their shares,
-    small corrections and scales.
+    Components depend on what a player may want: to face the ball, the place where it is met, or a target point; to come
+    to rest there; to spend a multiple of the stamina recovered in a cycle; to kick as `heads.kick.Kicks` says. The
+    network gives their shares, small corrections and scales.
 
     A parameter known to a hundredth of a degree pulls a thousand times harder than a command; so the layers that they
-    share learn from the commands, and the aims from turns by a bell of their own.
+    share learn from the commands, and the target points from turns by a logistic density of their own.
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are, target_width: of what is known of each target. planned: see `kicks.Kicks`. aims: places of
-            `aims.TargetPoints`. commands: what it answers with.
+            kicks are, target_width: of what is known of each target. planned: see `heads.kick.Kicks`. aims: places of
+            `layers.targets.TargetPoints`. commands: what it answers with.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.

@@ -26,7 +26,7 @@ def logged_ball_speed_max(server: Tensor) -> Tensor:
 
 
 class Features(Protocol):
-    """What a network asks of its inputs. A new set of inputs is one such module and its place in `network.Clone`."""
+    """What a network asks of its inputs. A new set of inputs is one such module and its place in `clone.Clone`."""
 
     names: tuple[str, ...]
     channels: tuple[str, ...]

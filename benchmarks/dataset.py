@@ -23,10 +23,11 @@ from teamclone.cli.common import print_table
 from teamclone.dataset import clean
 from teamclone.store import create_store, open_store
 from teamclone.system.workers import available_cpus, run_tasks
+from teamclone.world import view
 
 COLUMNS = {
-    "frames": clean.FRAME_COLUMNS,
-    "player_states": clean.PLAYER_COLUMNS,
+    "frames": view.FRAME_COLUMNS,
+    "player_states": view.PLAYER_COLUMNS,
     "commands": clean.COMMAND_COLUMNS,
 }
 

@@ -25,6 +25,7 @@ from teamclone.dataset import clean
 from teamclone.logs import Match, find_matches, read_pair
 from teamclone.store import Store, create_store
 from teamclone.store.postgres.location import Location
+from teamclone.world import view
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
 from postgres import start_server
@@ -63,8 +64,8 @@ def typical(costs: list[Cost]) -> Cost:
 
 def read(store: Store, match_id: str) -> None:
     """What a dataset needs of a match."""
-    store.read_match_columns(match_id, "frames", columns=clean.FRAME_COLUMNS)
-    store.read_match_columns(match_id, "player_states", columns=clean.PLAYER_COLUMNS)
+    store.read_match_columns(match_id, "frames", columns=view.FRAME_COLUMNS)
+    store.read_match_columns(match_id, "player_states", columns=view.PLAYER_COLUMNS)
     store.read_match_columns(match_id, "commands", columns=clean.COMMAND_COLUMNS)
     store.read_parameters(match_id)
 

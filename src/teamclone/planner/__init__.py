@@ -1,9 +1,9 @@
 """What an agent of HELIOS Base would do with the ball: the planner that most agents of the league grew from.
 
 The rules and their numbers are those of the public sources of HELIOS Base and of its library librcsc (Akiyama et al.,
-github.com/helios-base) named below, checked against logs. How soon players arrive, what opponents can reach, and how safe
-the ball is are written from the physics of the server. The loops over candidates still go through them in the order of
-those sources.
+github.com/helios-base) named below, checked against logs. How soon players arrive, what opponents can reach, and how
+safe the ball is are written from the physics of the server. The loops over candidates still go through them in the
+order of those sources.
 
 helios-base at commit 66fd63d6f9d022423b8c4430668a2b8510353caf (5 October 2025):
 

@@ -1,7 +1,8 @@
 """Parameters of the server that decide what happens in a cycle, with their defaults (rcssserver `serverparam.cpp`).
 
-A log names those of its match. Whoever computes with one takes it from there: `number` and `vector` fall back to the
-default of the server's version where an older log leaves one out.
+A log names those of its match, and every computation takes them from there: `number` and `vector` give the default of
+a version only for what a log leaves out. Datasets hold them in the order of `FIELDS`: after a change here raise
+`dataset.layout.FORMAT`.
 """
 
 from __future__ import annotations

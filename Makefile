@@ -44,7 +44,7 @@ demo: install
 	rm -rf $(DEMO)
 	$(BIN)/teamclone ingest samples --store $(DEMO)/store
 	$(BIN)/teamclone dataset --store $(DEMO)/store --team HELIOS_base --unseen YuShan2024 --out $(DEMO)/dataset
-	$(BIN)/teamclone train $(DEMO)/dataset --set data.batch_size=512 --set train.kicks=8 --set train.epochs=5 --out $(DEMO)/run
+	$(BIN)/teamclone train $(DEMO)/dataset --set data.batch_size=512 --set model.extra_kicks=8 --set train.epochs=5 --out $(DEMO)/run
 	$(BIN)/teamclone bench $(DEMO)/run -n 4000
 	$(BIN)/teamclone evaluate $(DEMO)/run
 	$(BIN)/teamclone report $(DEMO)/run

@@ -85,7 +85,7 @@ PLAIN = (
     PLANLESS[0],
     "model.kick_blocks=self,type,last,ball,reach,lines,mates,opponents,rivals",
     "model.kick_attention=0",
-    "train.kicks=0",
+    "model.extra_kicks=0",
     "train.optimiser=adam",
     "data.mirror=0.0",
 )
@@ -101,7 +101,7 @@ KICKS: dict[str, tuple[str, ...]] = {
     "without-plan": PLANLESS,
     "plan-of-kicks": PLANLESS[:1],
     "without-attention": ("model.kick_attention=0",),
-    "without-kicks": ("train.kicks=0",),
+    "without-kicks": ("model.extra_kicks=0",),
 }
 """What may be known of plans with the ball and of the other players, and how often kicks are shown: name and settings
 beside the preset's."""
@@ -115,7 +115,7 @@ REMEDIES: dict[str, tuple[str, ...]] = {
         "train.prior_correction=false",
     ),
     "mirror": ("data.mirror=0.5",),
-    "ensemble": ("model.members=3",),
+    "ensemble": ("model.ensemble_size=3",),
     "without-temperature": ("train.calibrate=false",),
 }
 """What is said to help with rare commands: name and settings beside those of the short schedule."""
@@ -125,7 +125,7 @@ TINY = (
     "train.epochs=1",
 )
 """Settings of --quick, for the paper's network too."""
-TINY_RELATIVE = ("model.kick_hidden=[16]", "model.parameter_hidden=[16]", "model.aim_hidden=[32]")
+TINY_EGOCENTRIC = ("model.kick_hidden=[16]", "model.parameter_hidden=[16]", "model.target_hidden=[32]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,12 +166,8 @@ def ablations() -> dict[str, tuple[str, ...]]:
     for block in ("view", "past", "plan"):
         if block not in model.blocks:
             found[f"with-{block}"] = (f"model.blocks={','.join((*model.blocks, block))}",)
-    found["without-aims"] = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0.0")
-    found["point-head"] = (
-        *("model.head=point", "model.parameter_hidden=[]", "train.aim_weight=0.0"),
-        *("model.kick_blocks=[]", "model.kick_hidden=[]", "model.kick_dropout=0.0"),
-        *("train.parameter_loss=masked", "train.parameter_weight=1.0"),
-    )
+    found["without-targets"] = ("model.target_points=0",)
+    found["point-head"] = ("model.family=egocentric-point",)
     found["gelu" if model.activation != "gelu" else "relu"] = (
         f"model.activation={'gelu' if model.activation != 'gelu' else 'relu'}",
     )
@@ -184,7 +180,7 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
     Args:
         scale: of all lengths, minutes and epochs. short_epochs: before scaling. quick: tiny networks, an epoch each.
     """
-    tiny = (*TINY, *TINY_RELATIVE) if quick else ()
+    tiny = (*TINY, *TINY_EGOCENTRIC) if quick else ()
 
     def epochs(count: float) -> tuple[str, ...]:
         return () if quick else (f"train.epochs={max(1, round(count * scale))}",)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -19,7 +18,9 @@ from typer.models import ArgumentInfo
 
 import teamclone
 from teamclone.cli.app import app
+from teamclone.models.config import FAMILIES
 from teamclone.store import schema
+from teamclone.system.settings import described
 from teamclone.training import config as training_config
 
 DOCS = Path(__file__).resolve().parent
@@ -137,55 +138,29 @@ def _default(parameter: inspect.Parameter, hint: Any) -> str:
 
 
 def _settings() -> str:
-    """One table for each section of a run's settings."""
+    """One table for each model family, then one for each other section of a run's settings."""
     parts = []
-    for section, rows in _settings_rows().items():
-        parts.append(f"### {section}\n\n" + _table(("setting", "values", "default", "meaning"), rows))
+    for name, family in FAMILIES.items():
+        rows = [("`model.family`", "", f'`"{name}"`', "which of the families"), *_settings_of(family, "model")]
+        parts.append(f"### model, family {name}\n\n{_settings_table(rows)}")
+    for section, kind in get_type_hints(training_config.Config).items():
+        if section != "model":
+            parts.append(f"### {section}\n\n{_settings_table(_settings_of(kind, section))}")
     return "\n\n".join(parts)
 
 
-def _settings_rows() -> dict[str, list[tuple[str, str, str, str]]]:
-    """Rows of each section: key, values, default and meaning, from the dataclasses and their docstrings."""
-    made: dict[str, list[tuple[str, str, str, str]]] = {}
-    for section, kind in get_type_hints(training_config.Config).items():
-        about = dict(_entries(_sections(inspect.getdoc(kind) or "").get("Attributes", "")))
-        table = training_config.to_table(training_config.Config())[section]
-        hints = get_type_hints(kind)
-        made[section] = [
-            (
-                f"`{section}.{one.name}`",
-                _values(f"{section}.{one.name}", hints[one.name]),
-                f"`{_toml(table[one.name])}`",
-                about.get(one.name, ""),
-            )
-            for one in fields(kind)
-        ]
-    return made
+def _settings_table(rows: Iterable[Iterable[str]]) -> str:
+    return _table(("setting", "values", "default", "meaning"), rows)
 
 
-def _values(key: str, hint: Any) -> str:
-    """What a setting may be: its choices, or its type with bounds."""
-    scalar = hint if hint in (int, float, bool, str) else get_args(hint)[0]
-    if key in training_config._CHOICES:
-        text = ", ".join(f"`{choice}`" for choice in training_config._CHOICES[key])
-    else:
-        text = {int: "whole number", float: "number", bool: "switch", str: "word"}[scalar]
-        low, high = training_config._AT_LEAST.get(key), training_config._AT_MOST.get(key)
-        if key in training_config._ABOVE_ZERO:
-            text += ", above 0"
-        if low is not None:
-            text += f", at least {low}"
-        if high is not None:
-            text += f", at most {high}"
-    return text if scalar is hint else f"list: {text}"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml, value))}]"
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+def _settings_of(kind: type[Any], section: str) -> list[tuple[str, str, str, str]]:
+    """Key, values, default and meaning of the settings of a section; meanings are those of the docstrings."""
+    about: dict[str, str] = {}
+    for base in kind.__mro__[:-1]:
+        about = dict(_entries(_sections(inspect.cleandoc(base.__doc__ or "")).get("Attributes", ""))) | about
+    return [
+        (f"`{section}.{one.name}`", one.values, f"`{one.default}`", about.get(one.name, "")) for one in described(kind)
+    ]
 
 
 # Python API

@@ -20,15 +20,13 @@ from teamclone.play.runner import PlayReport, play
 from teamclone.play.schedule import Schedule, folder_of, read_schedule, schedule_from
 from teamclone.play.server import find_server
 from teamclone.store import create_store
-from teamclone.system.settings import fill
+from teamclone.system.settings import from_table
 from teamclone.training.config import Config, differences, load_config
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, is_run, open_run
 
 STORE, DATASET, RUN = "store", "dataset", "run"
 """Folders beside those that `play` makes."""
-MAX_SHARE = 0.9
-"""Of the matches, for test or validation."""
 
 
 class Stage(StrEnum):
@@ -106,20 +104,12 @@ def load_pipeline(path: Path) -> Pipeline:
     table = read_schedule(path)
     schedule = schedule_from(table, where=str(path), base=folder_of(path))
     problems: list[str] = []
-    store = fill(StoreSettings, table.get("store", {}), "store", problems)
-    training = fill(TrainSettings, table.get("train", {}), "train", problems)
-    evaluation = fill(EvaluateSettings, table.get("evaluate", {}), "evaluate", problems)
+    store = from_table(StoreSettings, table.get("store", {}), "store", problems)
+    training = from_table(TrainSettings, table.get("train", {}), "train", problems)
+    evaluation = from_table(EvaluateSettings, table.get("evaluate", {}), "evaluate", problems)
     config = None
     if "dataset" in table:
-        config = fill(DatasetConfig, table["dataset"], "dataset", problems)
-        if not config.teams:
-            problems.append("dataset.teams: name the team to clone")
-        shares = {"test": config.test, "validation": config.validation}
-        problems += [
-            f"dataset.{name}: expected a share from 0 to 0.9, got {share}"
-            for name, share in shares.items()
-            if not 0 <= share <= MAX_SHARE
-        ]
+        config = from_table(DatasetConfig, table["dataset"], "dataset", problems)
         try:
             config.check()
         except UsageError as error:

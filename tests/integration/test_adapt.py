@@ -137,8 +137,8 @@ def test_resumed_is_as_never_interrupted(base: Run, team: Dataset, tmp_path: Pat
 
 def test_relative_inputs_and_mixtures_are_adapted_too(team: Dataset, tmp_path: Path) -> None:
     small = (
-        *("model.hidden=[16]", "model.aim_hidden=[8]", "model.parameter_hidden=[8]", "model.kick_hidden=[8]"),
-        *("train.kicks=128", "train.epochs=1"),
+        *("model.hidden=[16]", "model.target_hidden=[8]", "model.parameter_hidden=[8]", "model.kick_hidden=[8]"),
+        *("model.extra_kicks=128", "train.epochs=1"),
     )
     first = train(load_config("best", [*SHORT, *QUIET, *small]), team, tmp_path / "base")
     run = adapt(first, team, tmp_path / "run", "train.epochs=1")
@@ -146,8 +146,8 @@ def test_relative_inputs_and_mixtures_are_adapted_too(team: Dataset, tmp_path: P
     begun, best = (load_file(path) for path in (run.checkpoint_path("base"), first.checkpoint_path("best-loss")))
     assert all(torch.equal(begun[name], best[name]) for name in begun | best)
     # As many kicks to a sample as in the base, whose batches of 64 had 128.
-    for changes, kicks in (((), 2048), (("data.batch_size=3",), 6), (("data.batch_size=3", "train.kicks=5"), 5)):
-        assert adaptation(first, changes)[0].train.kicks == kicks
+    for changes, kicks in (((), 2048), (("data.batch_size=3",), 6), (("data.batch_size=3", "model.extra_kicks=5"), 5)):
+        assert adaptation(first, changes)[0].model.extra_kicks == kicks
 
 
 def test_the_temperature_of_the_base_is_not_kept(team: Dataset, tmp_path: Path) -> None:
@@ -180,8 +180,8 @@ def test_the_report_tells_the_command(base: Run, team: Dataset, tmp_path: Path) 
 
 
 def test_what_cannot_be_adapted_is_told(base: Run, team: Dataset, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"model\.hidden, model\.head cannot be changed.*network of its base"):
-        adaptation(base, ["train.epochs=2", "model.hidden=[16]", "model.head=mixture"])
+    with pytest.raises(UsageError, match=r"model\.hidden, model\.family cannot be changed.*network of its base"):
+        adaptation(base, ["train.epochs=2", "model.hidden=[16]", "model.family=egocentric"])
     with pytest.raises(UsageError, match=r"no setting 'train\.epoch'.*train\.epochs"):
         adaptation(base, ["train.epoch=2"])
     begun = create_run(tmp_path / "begun", base.config, team, device="cpu", precision="fp32")

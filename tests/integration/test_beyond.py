@@ -39,7 +39,12 @@ SMALL = (
     "train.device=cpu",
 )
 MIXTURE = (
-    *("model.blocks=self,role,ball,mode", "model.kick_blocks=self,ball,mode", "model.aims=2", "model.aim_hidden=8"),
+    *(
+        "model.blocks=self,role,ball,mode",
+        "model.kick_blocks=self,ball,mode",
+        "model.target_points=2",
+        "model.target_hidden=8",
+    ),
     *("model.parameter_hidden=16", "model.kick_hidden=8", "data.mirror=0.5", "train.balance=oversample"),
 )
 

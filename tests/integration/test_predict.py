@@ -26,8 +26,13 @@ from teamclone.world.view import view_columns
 from teamclone.world.world import World
 
 SETTINGS = (
-    *("model.hidden=[16]", "model.members=1", "model.blocks=self,role,ball,mode", "model.kick_blocks=self,ball,mode"),
-    *("model.aims=2", "model.aim_hidden=8", "model.parameter_hidden=16", "model.kick_hidden=8"),
+    *(
+        "model.hidden=[16]",
+        "model.ensemble_size=1",
+        "model.blocks=self,role,ball,mode",
+        "model.kick_blocks=self,ball,mode",
+    ),
+    *("model.target_points=2", "model.target_hidden=8", "model.parameter_hidden=16", "model.kick_hidden=8"),
     *("model.kick_attention=0", "train.epochs=1", "data.batch_size=256", "data.batches_per_epoch=4"),
     *("train.threads=1", "train.precision=fp32", "train.device=cpu"),
 )

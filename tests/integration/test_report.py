@@ -368,7 +368,7 @@ def test_report_in_a_browser(written: Path, tmp_path: Path, scheme: str, width: 
 
 def test_distributions_are_judged_by_their_likelihood(tmp_path: Path) -> None:
     data = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=40))
-    widths = ("hidden", "aim_hidden", "parameter_hidden", "kick_hidden")
+    widths = ("hidden", "target_hidden", "parameter_hidden", "kick_hidden")
     small = [*(f"model.{name}=[16]" for name in widths), "train.epochs=1"]
     machine = ["train.threads=1", "train.device=cpu", "train.precision=fp32"]
     run = train(load_config("best", [*small, *machine, "data.batch_size=100"]), data, tmp_path / "run")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.evaluation.evaluate import evaluate
 from teamclone.evaluation.latency import measure_latency
 from teamclone.models.clone import Clone
+from teamclone.models.config import FAMILIES
 from teamclone.training.config import Config, load_config, to_table
 from teamclone.training.loop import Progress, train
 from teamclone.training.run import Run, open_run
@@ -200,20 +202,20 @@ def outcome(run: Run) -> tuple[Any, ...]:
 
 
 RELATIVE = (
-    "model.features=relative",
+    "model.family=egocentric",
     "model.blocks=self,role,ball",
     "model.kick_blocks=self,ball,mates",
-    "model.aims=2",
-    "model.aim_hidden=8",
+    "model.target_points=2",
+    "model.target_hidden=8",
     "model.parameter_hidden=8",
     "model.kick_hidden=8",
-    "model.head=mixture",
-    "train.parameter_weight=0.1",
+    *("model.kick_attention=0", "model.kick_dropout=0", "model.extra_kicks=0", "model.target_weight=0"),
+    "model.parameter_weight=0.1",
 )
 REMEDIES = (
     *RELATIVE,
     *("train.balance=oversample", "train.calibrate=true", "data.mirror=0.5"),
-    *("model.kick_attention=4", "model.kick_blocks=ball,plan", "model.kick_dropout=0.1", "train.kicks=8"),
+    *("model.kick_attention=4", "model.kick_blocks=ball,plan", "model.kick_dropout=0.1", "model.extra_kicks=8"),
 )
 BASES: dict[str, Sequence[str]] = {
     "paper": (),
@@ -222,13 +224,13 @@ BASES: dict[str, Sequence[str]] = {
     "weights": ("train.balance=weights",),
 }
 CHANGES: dict[str, tuple[str, Sequence[str]]] = {
-    "model.features": ("paper", ["model.features=relative", "model.blocks=self"]),
+    "model.family": ("relative", ["model.family=egocentric-point"]),
     "model.own_type": ("paper", ["model.own_type=true"]),
     "model.all_types": ("paper", ["model.all_types=kick"]),
     "model.blocks": ("relative", ["model.blocks=self,role"]),
     "model.kick_blocks": ("relative", ["model.kick_blocks=ball"]),
-    "model.aims": ("relative", ["model.aims=3"]),
-    "model.aim_hidden": ("relative", ["model.aim_hidden=9"]),
+    "model.target_points": ("relative", ["model.target_points=3"]),
+    "model.target_hidden": ("relative", ["model.target_hidden=9"]),
     "model.parameter_hidden": ("relative", ["model.parameter_hidden=9"]),
     "model.kick_hidden": ("relative", ["model.kick_hidden=9"]),
     "model.kick_attention": ("relative", ["model.kick_attention=4"]),
@@ -236,11 +238,7 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "model.hidden": ("paper", ["model.hidden=[17]"]),
     "model.activation": ("paper", ["model.activation=tanh"]),
     "model.dropout": ("paper", ["model.dropout=0.5"]),
-    "model.head": (
-        "relative",
-        ["model.head=point", "model.kick_blocks=[]", "model.kick_hidden=[]", "model.parameter_hidden=[]"],
-    ),
-    "model.members": ("paper", ["model.members=2"]),
+    "model.ensemble_size": ("paper", ["model.ensemble_size=2"]),
     "data.batch_size": ("paper", ["data.batch_size=32"]),
     "data.batches_per_epoch": ("paper", ["data.batches_per_epoch=2"]),
     "data.repeat": ("few", ["data.repeat=true"]),
@@ -253,10 +251,10 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "train.weight_decay": ("paper", ["train.weight_decay=0.1"]),
     "train.betas": ("paper", ["train.betas=[0.8, 0.9]"]),
     "train.epsilon": ("paper", ["train.epsilon=0.1"]),
-    "train.parameter_loss": ("paper", ["train.parameter_loss=masked"]),
-    "train.parameter_weight": ("paper", ["train.parameter_weight=2"]),
-    "train.aim_weight": ("relative", ["train.aim_weight=1"]),
-    "train.kicks": ("relative", ["train.kicks=8"]),
+    "model.parameter_loss": ("paper", ["model.parameter_loss=masked"]),
+    "model.parameter_weight": ("paper", ["model.parameter_weight=2"]),
+    "model.target_weight": ("relative", ["model.target_weight=1"]),
+    "model.extra_kicks": ("relative", ["model.extra_kicks=8"]),
     "train.balance": ("paper", ["train.balance=undersample"]),
     "train.balance_strength": ("weights", ["train.balance_strength=0.5"]),
     "train.prior_correction": ("weights", ["train.prior_correction=false"]),
@@ -269,12 +267,13 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
 """For each setting a base on which it has an effect, and what changes it."""
 REFUSED = {"train.device", "model.commands"}
 """Only one value works here; the others are refused, which another test shows."""
-ONLY_SPEED = {"data.keep_gb"}
+ONLY_SPEED = {"data.cache_gb"}
 """No result may depend on it, but for rounding."""
 
 
 def test_every_setting_is_tried() -> None:
     known = {f"{section}.{key}" for section, values in to_table(Config()).items() for key in values}
+    known |= {f"model.{item.name}" for family in FAMILIES.values() for item in fields(family)}
     assert set(CHANGES) | REFUSED | ONLY_SPEED == known
 
 
@@ -313,10 +312,10 @@ def test_what_is_kept_in_memory_changes_no_result(dataset: Dataset, tmp_path: Pa
     inputs = len(Clone(tiny(*REMEDIES).model).inputs.names)
     told: list[tuple[int, ...]] = []
 
-    def trained(keep_gb: float) -> dict[str, Any]:
+    def trained(cache_gb: float) -> dict[str, Any]:
         made: list[Progress] = []
-        config = tiny(*REMEDIES, f"data.keep_gb={keep_gb}")
-        run = train(config, dataset, tmp_path / f"run{keep_gb}", on_progress=made.append)
+        config = tiny(*REMEDIES, f"data.cache_gb={cache_gb}")
+        run = train(config, dataset, tmp_path / f"run{cache_gb}", on_progress=made.append)
         told.append(tuple({at.batches for at in made if at.epoch == 0}))
         return figures(run)[-1]
 
@@ -342,7 +341,7 @@ def test_kicks_beside_the_batches_teach_the_layers_of_kicks_and_no_other(dataset
         run = train(tiny(*RELATIVE, "train.epochs=1", *settings), dataset, tmp_path / name)
         return load_file(run.checkpoint_path("last"))
 
-    plain, taught = trained("plain"), trained("taught", "train.kicks=16")
+    plain, taught = trained("plain"), trained("taught", "model.extra_kicks=16")
     for name, weight in plain.items():
         of_kicks = name.startswith(("trunk.kick.", "head.kick.", "head.tackle."))
         assert torch.equal(weight, taught[name]) != of_kicks, name

@@ -89,10 +89,10 @@ def test_trains_reports_and_resumes(dataset: Path, tmp_path: Path, teamclone: Ca
     # A setting of the paper's inputs, which the default preset does not have, says again what the run was made with.
     code, _, err = teamclone(
         *(dataset, "--out", tmp_path / "run", "--resume"),
-        *("--set", "train.epochs=4", "--set", "model.own_type=false", "--set", "train.parameter_loss=masked"),
+        *("--set", "train.epochs=4", "--set", "model.own_type=false", "--set", "model.parameter_loss=masked"),
     )
     assert code == 1
-    assert "cannot resume with other settings (train.parameter_loss: paper became masked)" in err
+    assert "cannot resume with other settings (model.parameter_loss: paper became masked)" in err
 
 
 @pytest.mark.parametrize("killed_by", [signal.SIGKILL, signal.SIGINT])

@@ -27,14 +27,15 @@ SETTINGS = (
     "train.epochs=2",
     "train.threads=1",
     "train.precision=fp32",
-    "train.parameter_loss=masked",  # its mean is over what was issued, which differs between the shares
+    "model.parameter_loss=masked",  # its mean is over what was issued, which differs between the shares
     "train.device=cpu",
 )
 
 
 # Relative inputs, of which half are mirrored, rare commands drawn more often, probabilities calibrated.
 REMEDIES = (
-    "model.features=relative",
+    "model.family=egocentric-point",
+    "model.target_points=0",
     "model.blocks=self,role,ball",
     "train.balance=oversample",
     "train.calibrate=true",

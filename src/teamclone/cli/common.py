@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from teamclone.errors import UsageError
-from teamclone.system.settings import value_of
+from teamclone.system.settings import assignment
 
 E = TypeVar("E", bound=StrEnum)
 
@@ -69,14 +69,8 @@ def progress(what: str) -> Progress:
 
 
 def values_of(settings: Iterable[str]) -> dict[str, Any]:
-    """``KEY=VALUE`` texts, see `settings.value_of`."""
-    values: dict[str, Any] = {}
-    for setting in settings:
-        key, equals, text = setting.partition("=")
-        if not equals:
-            raise UsageError(f"--set: expected KEY=VALUE, got {setting!r}")
-        values[key.strip()] = value_of(text.strip())
-    return values
+    """Return the values of ``KEY=VALUE`` texts, see `settings.assignment`."""
+    return dict(assignment(setting) for setting in settings)
 
 
 def choice(kind: type[E], value: str, *, option: str) -> E:

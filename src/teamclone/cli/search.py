@@ -59,6 +59,7 @@ def search(
     from teamclone.dataset.reader import open_dataset
     from teamclone.search.run import search as run_search
     from teamclone.search.trials import Objective, SearchConfig, Status
+    from teamclone.system.settings import assignment
 
     options: dict[str, Any] = {
         "beam": beam,
@@ -70,7 +71,7 @@ def search(
     options["start"] = tuple(map(_widths, start)) if start else None
     config = SearchConfig(
         base=base,
-        held=tuple(sorted({text.partition("=")[0].strip() for text in overrides or []})),
+        held=tuple(sorted({assignment(text)[0] for text in overrides or []})),
         objective=choice(Objective, objective, option="--objective"),
         **_of_mode(mode, options),
     )

@@ -24,11 +24,16 @@ from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
 from teamclone.store import Store
 from teamclone.store.shared import SharedStore
+from teamclone.system.settings import setting
 from teamclone.system.workers import Died, run_tasks
 from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS
 
 AHEAD = 64
 """Cleaned matches that a cluster may hold ready: more than one writer takes from it in a second, in 300 MB."""
+
+
+MAX_SHARE = 0.9
+"""Of the matches, for test or validation."""
 
 
 class SplitBy(StrEnum):
@@ -60,7 +65,7 @@ class DatasetConfig:
         seed: of the split.
     """
 
-    teams: tuple[str, ...]
+    teams: tuple[str, ...] = setting(some=True)
     unseen: tuple[str, ...] = ()
     split: SplitBy = SplitBy.MATCH
     commands: Commands = Commands.EXECUTED
@@ -71,8 +76,8 @@ class DatasetConfig:
     idle: bool = False
     test_matches: tuple[str, ...] = ()
     validation_matches: tuple[str, ...] = ()
-    test: float = 0.15
-    validation: float = 0.15
+    test: float = setting(0.15, at_least=0, at_most=MAX_SHARE)
+    validation: float = setting(0.15, at_least=0, at_most=MAX_SHARE)
     seed: int = 0
 
     @property

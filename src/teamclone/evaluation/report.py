@@ -16,6 +16,7 @@ from teamclone.evaluation import bootstrap, figures, metrics, paper
 from teamclone.evaluation.evaluate import evaluate_and_save, load_evaluation
 from teamclone.evaluation.latency import load_bench, measure_run
 from teamclone.models.clone import model_id
+from teamclone.models.config import EgocentricPointConfig, PaperConfig
 from teamclone.system.files import write_atomic
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
@@ -285,9 +286,9 @@ def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
 
 def trained_error(config: Config) -> str:
     """What a run took as the error of parameters, in words."""
-    if config.model.head == "mixture":
+    if not isinstance(config.model, PaperConfig | EgocentricPointConfig):
         return "negative log-likelihood, nats"
-    where = "all six outputs" if config.train.parameter_loss == "paper" else "those issued"
+    where = "all outputs" if config.model.parameter_loss == "paper" else "those issued"
     return f"mean square over {where}"
 
 

@@ -10,7 +10,13 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.models.answer import Answer, Prediction
-from teamclone.models.config import ModelConfig
+from teamclone.models.config import (
+    EgocentricConfig,
+    EgocentricPointConfig,
+    EgocentricTrunkConfig,
+    ModelConfig,
+    PaperConfig,
+)
 from teamclone.models.heads.ensemble import EnsembleHead
 from teamclone.models.heads.mixture import MixtureHead
 from teamclone.models.heads.point import PointHead
@@ -19,39 +25,40 @@ from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.paper import Features, PaperFeatures
 from teamclone.models.layers.players import PlayerEncoder
 from teamclone.models.layers.targets import TARGET_COLUMNS, TargetPoints, layers
-from teamclone.models.loss import Loss
+from teamclone.models.loss import Balance, Loss, ParameterLoss
 from teamclone.world.state import State, Target
 
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"relu": nn.ReLU, "gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
 
 
 class EgocentricTrunk(nn.Module):
-    """Hidden layers over relative inputs: where the player makes for, then what he does, how, and apart from it a kick.
+    """Hidden layers over egocentric inputs: target points, then the command, its parameters, and apart from it a kick.
 
-    The layers of dashes and turns see what the command was decided on, but do not teach it, see `MixtureHead`.
+    The layers of dashes and turns see the features of the command, but send no gradient back to them, see
+    `MixtureHead`. In the family with a point head there are only target points and the layers of the command.
     """
 
     command_columns: Tensor
     kick_columns: Tensor
-    aim_columns: Tensor
+    target_columns: Tensor
     signs: Tensor
 
-    def __init__(self, config: ModelConfig, features: EgocentricFeatures) -> None:
+    def __init__(self, config: EgocentricTrunkConfig, features: EgocentricFeatures) -> None:
         super().__init__()
         activation = _ACTIVATIONS[config.activation]
         self.n_inputs = features.n_inputs
         for name, blocks in (
             ("command_columns", config.blocks),
-            ("kick_columns", config.kick_blocks),
-            ("aim_columns", ("role",) if "role" in config.blocks else ()),
+            ("kick_columns", _kick_blocks(config)),
+            ("target_columns", ("role",) if "role" in config.blocks else ()),
         ):
             self.register_buffer(name, torch.tensor(features.columns(blocks)), persistent=False)
         self.register_buffer("signs", features.signs, persistent=False)
-        self.aims = TargetPoints(len(self.aim_columns), config.aims, config.aim_hidden, activation)
-        seen = len(self.command_columns) + TARGET_COLUMNS * config.aims
+        self.targets = TargetPoints(len(self.target_columns), config.target_points, config.target_hidden, activation)
+        seen = len(self.command_columns) + TARGET_COLUMNS * config.target_points
         self.command = layers((seen, *config.hidden), activation, config.dropout)
-        self.answers = config.head == "mixture"
-        if self.answers:
+        self.answers = isinstance(config, EgocentricConfig)
+        if isinstance(config, EgocentricConfig):
             self.parameters_of = layers(
                 (seen + config.hidden[-1], *config.parameter_hidden), activation, config.dropout
             )
@@ -62,8 +69,8 @@ class EgocentricTrunk(nn.Module):
     def forward(self, inputs: Tensor, *, kicks: Tensor | None = None) -> TrunkOutput:
         """``kicks``: which of the situations need the layers of a kick, (n,) places; None for all."""
         columns, geometry = inputs[:, : self.n_inputs], inputs[:, self.n_inputs :]
-        aims, bearing, power = self.aims(columns.index_select(1, self.aim_columns), geometry)
-        seen = torch.cat([columns.index_select(1, self.command_columns), aims], 1)
+        targets, bearing, power = self.targets(columns.index_select(1, self.target_columns), geometry)
+        seen = torch.cat([columns.index_select(1, self.command_columns), targets], 1)
         hidden = self.command(seen)
         parameters, at_ball = hidden[:0], KickFeatures(hidden[:0], geometry[:0], None)
         if self.answers:
@@ -105,15 +112,11 @@ class Clone(nn.Module):
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
-        if config.features == "paper":
-            self.features = PaperFeatures(own_type=config.own_type, all_types=config.all_types)
-        else:
-            blocks = tuple({*config.blocks, *config.kick_blocks})
-            self.features = EgocentricFeatures(blocks, others=bool(config.kick_attention))
-        trunks = [_trunk(config, self.features) for _ in range(config.members)]
-        heads = [_head(config) for _ in range(config.members)]
-        self.trunk = trunks[0] if config.members == 1 else Trunks(trunks)
-        self.head = heads[0] if config.members == 1 else EnsembleHead(heads)
+        self.features = _features(config)
+        trunks = [_trunk(config, self.features) for _ in range(config.ensemble_size)]
+        heads = [_head(config) for _ in range(config.ensemble_size)]
+        self.trunk = trunks[0] if config.ensemble_size == 1 else Trunks(trunks)
+        self.head = heads[0] if config.ensemble_size == 1 else EnsembleHead(heads)
         for module in self.modules():
             if isinstance(module, nn.Linear):
                 # Keras' default, with which the paper trained.
@@ -136,24 +139,28 @@ class Clone(nn.Module):
             kicks: (n,) indices of the situations whose kicks and tackles are wanted; None for all. Leaving out the
                 others saves most of the time. A point head always answers all.
         """
-        if kicks is None or self.config.head == "point":
+        if kicks is None or not isinstance(self.config, EgocentricConfig):
             answer: Answer = self.head(self.trunk(inputs))
         else:
             answer = self.head(self.trunk(inputs, kicks=kicks))
         return answer
 
-    def loss(self, answer: Any, target: Target, **settings: Any) -> Loss:
-        """Return the training error of an answer of this clone; ``settings`` as in the head's ``loss``."""
-        return self.head.loss(answer, target, **settings)
+    def loss(self, answer: Any, target: Target, *, balance: Balance | None = None, whole: Tensor | None = None) -> Loss:
+        """Return the training error of an answer of this clone, by the weights of its family's settings.
+
+        Args:
+            target: what the players did. balance, whole: see `loss.point_loss`.
+        """
+        return self.head.loss(answer, target, balance=balance, whole=whole)
 
     def kick_loss(self, inputs: Tensor, target: Target, *, of: int) -> Tensor:
-        """Return the error of kicks and tackles alone, summed over the samples and divided by ``of``.
+        """Return the weighted error of kicks and tackles alone, summed over the samples and divided by ``of``.
 
         Args:
             inputs: (batch, columns) normalised. target: kicks and tackles only.
         """
         head, trunk = cast(MixtureHead, self.head), cast(EgocentricTrunk, self.trunk)
-        return head.kick_loss(head.kicks(trunk.at_ball(inputs)), target, of=of)
+        return self.config.parameter_weight * head.kick_loss(head.kicks(trunk.at_ball(inputs)), target, of=of)
 
     def forward(self, state: State) -> Prediction:
         return self.answer(state).point()
@@ -168,24 +175,44 @@ class Clone(nn.Module):
         return prediction.logits.softmax(1), prediction.parameters
 
 
+def _features(config: ModelConfig) -> PaperFeatures | EgocentricFeatures:
+    if isinstance(config, PaperConfig):
+        return PaperFeatures(own_type=config.own_type, all_types=config.all_types)
+    config = cast(EgocentricTrunkConfig, config)
+    attention = isinstance(config, EgocentricConfig) and config.kick_attention > 0
+    return EgocentricFeatures(tuple({*config.blocks, *_kick_blocks(config)}), others=attention)
+
+
+def _kick_blocks(config: EgocentricTrunkConfig) -> tuple[str, ...]:
+    return config.kick_blocks if isinstance(config, EgocentricConfig) else ()
+
+
 def _trunk(config: ModelConfig, features: PaperFeatures | EgocentricFeatures) -> nn.Sequential | EgocentricTrunk:
     if isinstance(features, EgocentricFeatures):
-        return EgocentricTrunk(config, features)
+        return EgocentricTrunk(cast(EgocentricTrunkConfig, config), features)
     return layers((len(features.names), *config.hidden), _ACTIVATIONS[config.activation], config.dropout)
 
 
 def _head(config: ModelConfig) -> PointHead | MixtureHead:
-    if config.head == "mixture":
-        return MixtureHead(
-            width=config.hidden[-1],
-            parameter_width=config.parameter_hidden[-1],
-            kick_width=config.kick_hidden[-1] + config.kick_attention,
-            target_width=config.kick_attention,
-            planned="plan" in config.kick_blocks,
-            aims=config.aims,
-            commands=config.commands,
+    if isinstance(config, PaperConfig | EgocentricPointConfig):
+        return PointHead(
+            config.hidden[-1],
+            config.commands,
+            parameter_loss=cast(ParameterLoss, config.parameter_loss),
+            parameter_weight=config.parameter_weight,
         )
-    return PointHead(config.hidden[-1], config.commands)
+    config = cast(EgocentricConfig, config)
+    return MixtureHead(
+        width=config.hidden[-1],
+        parameter_width=config.parameter_hidden[-1],
+        kick_width=config.kick_hidden[-1] + config.kick_attention,
+        target_width=config.kick_attention,
+        planned="plan" in config.kick_blocks,
+        target_points=config.target_points,
+        commands=config.commands,
+        parameter_weight=config.parameter_weight,
+        target_weight=config.target_weight,
+    )
 
 
 def parameter_count(model: nn.Module) -> int:

@@ -1,65 +1,145 @@
-"""What a network is built from. Free of PyTorch, so that a wrong setting is told at once."""
+"""Model families and their settings. Free of PyTorch, so that a wrong setting is reported before it is loaded.
+
+A family is a set of inputs, a trunk over them and a head. Each has one class of settings, whose defaults are those of
+the preset that it is for: `paper` of `PaperConfig`, `best` of `EgocentricConfig`.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from teamclone.rcss.commands import CLONED
+from teamclone.rcss.commands import CLONED, REPERTOIRE, not_of_repertoire
+from teamclone.rcss.player_types import GROUPS
+from teamclone.system.settings import setting, without_effect
 
-FEATURE_SETS = ("paper", "relative")
-"""Sets of inputs; the modules are `inputs.paper.PaperFeatures` and `inputs.egocentric.EgocentricFeatures`."""
 BLOCKS = (
     "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
     "mode",
 )  # fmt: skip
-"""Blocks of the relative inputs, in the order of their columns; see `inputs.egocentric.EgocentricFeatures`."""
-HEADS = ("point", "mixture")
-"""Forms of the answer: the paper's point, or a distribution of every parameter."""
+"""Blocks of the egocentric inputs, in the order of their columns; see `inputs.egocentric.EgocentricFeatures`."""
 ATTENTION_HEADS = 4
 """Heads of attention in `layers.players.PlayerEncoder`."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
 """Hidden activations."""
+LOSS_SETTINGS = ("parameter_loss", "parameter_weight", "target_weight", "extra_kicks")
+"""Settings of the families that only training uses; all others make the network what it is."""
+
+
+def _attention(width: int) -> str | None:
+    return f"a multiple of {ATTENTION_HEADS}, got {width}" if width % ATTENTION_HEADS else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelConfig:
-    """What a network is built from; the paper's by default.
+    """Settings of all families.
 
     Attributes:
-        features: name of the set of inputs, see `FEATURE_SETS`.
-        own_type: add the acting player's type (127 inputs instead of 119). Only of the paper's inputs.
-        all_types: groups of type parameters to add for all 22 players: movement, kick, stamina. Only of the paper's.
-        blocks: blocks that decide on the command, see `BLOCKS`. Only of the relative inputs, as all that follows.
-        kick_blocks: blocks that decide where a kick goes.
-        aims: places on the pitch that the network supposes a player to make for; see `layers.targets.TargetPoints`.
-        aim_hidden: widths of the layers that find them.
+        hidden: widths of the hidden layers that decide on the command.
+        activation: of the hidden layers.
+        dropout: share of the hidden units left out at random in training.
+        commands: what the model answers with, some of REPERTOIRE in their order: those of the datasets that it is for.
+        ensemble_size: networks that learn side by side over the same inputs and answer together.
+        parameter_weight: of the parameters' error beside that of the command, in training.
+    """
+
+    family: ClassVar[str]
+
+    hidden: tuple[int, ...] = setting((512, 256, 128), at_least=1, some=True)
+    activation: str = setting("relu", choices=ACTIVATIONS)
+    dropout: float = setting(0.0, at_least=0, at_most=0.9)
+    commands: tuple[str, ...] = setting(CLONED, choices=REPERTOIRE, rule=not_of_repertoire)
+    ensemble_size: int = setting(1, at_least=1)
+    parameter_weight: float = setting(1.0, at_least=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperConfig(ModelConfig):
+    """The network of the paper: positions and velocities of the pitch, and a point head.
+
+    Attributes:
+        own_type: add the acting player's type (127 inputs instead of 119).
+        all_types: groups of type parameters to add for all 22 players.
+        parameter_loss: "paper": error of all six parameters, zero where not issued; "masked": of issued ones only.
+    """
+
+    family: ClassVar[str] = "paper"
+
+    own_type: bool = setting(False)
+    all_types: tuple[str, ...] = setting((), choices=tuple(GROUPS))
+    parameter_loss: str = setting("paper", choices=("paper", "masked"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EgocentricTrunkConfig(ModelConfig):
+    """Settings of the families that see the pitch from the acting player.
+
+    Attributes:
+        blocks: inputs that decide on the command, see `inputs.egocentric.EgocentricFeatures`.
+        target_points: places on the pitch that the network supposes a player to make for; see
+            `layers.targets.TargetPoints`. 0 for none.
+        target_hidden: widths of the layers that find them.
+    """
+
+    blocks: tuple[str, ...] = setting(
+        ("self", "role", "type", "last", "ball", "reach", "lines", "plan"), choices=BLOCKS
+    )
+    target_points: int = setting(6, at_least=0)
+    target_hidden: tuple[int, ...] = setting((512, 256), at_least=1)
+
+    def problems(self, key: str) -> list[str]:
+        """Return settings that would have no effect; see `system.settings.from_table`."""
+        if self.target_points:
+            return []
+        return without_effect(self, key, ("target_hidden",), f"{key}.target_points = 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EgocentricPointConfig(EgocentricTrunkConfig):
+    """Egocentric inputs with the point head of the paper.
+
+    Attributes:
+        parameter_loss: "paper": error of all six parameters, zero where not issued; "masked": of issued ones only.
+    """
+
+    family: ClassVar[str] = "egocentric-point"
+
+    parameter_loss: str = setting("masked", choices=("paper", "masked"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EgocentricConfig(EgocentricTrunkConfig):
+    """Egocentric inputs, and a head that answers with a distribution of every parameter.
+
+    Attributes:
+        kick_blocks: inputs that decide where a kick goes.
         parameter_hidden: widths of the layers that find power and direction of dashes and turns.
         kick_hidden: widths of the layers that decide where a kick goes.
         kick_dropout: `dropout` of these, of which there are few examples.
-        kick_attention: numbers by which each other player is known to these; see `layers.players.PlayerEncoder`.
+        kick_attention: numbers by which these layers know each other player; see `layers.players.PlayerEncoder`.
             A multiple of ATTENTION_HEADS; 0 for no such layers.
-        hidden: widths of the hidden layers.
-        activation: see `ACTIVATIONS`.
-        dropout: share of the hidden units left out at random in training.
-        head: see `HEADS`; mixture needs the relative inputs.
-        commands: what it answers with, some of REPERTOIRE in their order: those of the datasets that it is for.
-        members: networks that learn side by side over the same inputs and answer together.
+        target_weight: of the error by which turns teach the target points, in training.
+        extra_kicks: kicks and tackles shown beside each batch to the layers that find their parameters.
     """
 
-    features: str = "paper"
-    own_type: bool = False
-    all_types: tuple[str, ...] = ()
-    blocks: tuple[str, ...] = ()
-    kick_blocks: tuple[str, ...] = ()
-    aims: int = 0
-    aim_hidden: tuple[int, ...] = ()
-    parameter_hidden: tuple[int, ...] = ()
-    kick_hidden: tuple[int, ...] = ()
-    kick_dropout: float = 0.0
-    kick_attention: int = 0
-    hidden: tuple[int, ...] = (512, 256, 128)
-    activation: str = "relu"
-    dropout: float = 0.0
-    head: str = "point"
-    commands: tuple[str, ...] = CLONED
-    members: int = 1
+    family: ClassVar[str] = "egocentric"
+
+    kick_blocks: tuple[str, ...] = setting(("self", "type", "last", "ball", "reach", "lines", "plan"), choices=BLOCKS)
+    parameter_hidden: tuple[int, ...] = setting((256, 128), at_least=1, some=True)
+    kick_hidden: tuple[int, ...] = setting((512, 256), at_least=1, some=True)
+    kick_dropout: float = setting(0.3, at_least=0, at_most=0.9)
+    kick_attention: int = setting(64, at_least=0, rule=_attention)
+    target_weight: float = setting(0.1, at_least=0)
+    extra_kicks: int = setting(64, at_least=0)
+
+    def problems(self, key: str) -> list[str]:
+        """Return settings that would have no effect; see `system.settings.from_table`."""
+        if self.target_points:
+            return []
+        return without_effect(self, key, ("target_hidden", "target_weight"), f"{key}.target_points = 0")
+
+
+FAMILIES: dict[str, type[ModelConfig]] = {
+    one.family: one for one in (PaperConfig, EgocentricConfig, EgocentricPointConfig)
+}
+"""The families by their names, ``model.family`` of a run's settings."""

@@ -31,7 +31,7 @@ class Balance(NamedTuple):
 
 class Loss(NamedTuple):
     """The training error and two parts of it, scalars: ``total = cross_entropy + weight * parameters`` and, of a
-    `MixtureHead`, what teaches the aims."""
+    `MixtureHead`, what teaches the target points."""
 
     total: Tensor
     cross_entropy: Tensor
@@ -110,9 +110,9 @@ def mixture_loss(
     log_likelihood: Tensor,
     target: Target,
     *,
-    aims: Tensor | None = None,
+    to_targets: Tensor | None = None,
     weight: float = 1.0,
-    aim_weight: float = 0.0,
+    target_weight: float = 0.0,
     balance: Balance | None = None,
     whole: Tensor | None = None,
 ) -> Loss:
@@ -120,14 +120,15 @@ def mixture_loss(
 
     Args:
         logits: (batch, commands). log_likelihood: (batch,) of the parameters.
-        aims: (batch,) log-likelihood of the turns as the aims alone see them, 0 of other commands; None without aims.
-        aim_weight: of its mean.
+        to_targets: (batch,) log-likelihood of the turns by the target points alone, 0 of other commands; None without
+            target points.
+        target_weight: of its mean.
         target, weight, balance, whole: as of `point_loss`.
     """
     n = len(target.kind if whole is None else whole)
     cross_entropy = command_loss(logits, target.kind, balance=balance, of=n)
     parameters = -log_likelihood.sum() / n
     total = cross_entropy + weight * parameters
-    if aims is not None:
-        total = total - aim_weight * aims.sum() / n
+    if to_targets is not None:
+        total = total - target_weight * to_targets.sum() / n
     return Loss(total, cross_entropy, parameters)

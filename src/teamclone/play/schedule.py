@@ -11,7 +11,7 @@ import shlex
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from teamclone.errors import UsageError, choose
 from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.server_params import number
 from teamclone.system.files import digest
-from teamclone.system.settings import entries, fill
+from teamclone.system.settings import entries, from_table, setting
 
 COACH = 12
 """The number by which the league's ``start`` scripts know the coach."""
@@ -142,10 +142,10 @@ class Limits:
         silent_cycles: in a row without anything from a player on the field, who then counts as hung; 0 is never.
     """
 
-    connect_s: float = 60.0
-    stall_s: float = 30.0
-    match_s: float = 0.0
-    silent_cycles: int = 100
+    connect_s: float = setting(60.0, above=0)
+    stall_s: float = setting(30.0, above=0)
+    match_s: float = setting(0.0, at_least=0)
+    silent_cycles: int = setting(100, at_least=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +199,7 @@ class Pairing:
 
     left: tuple[str, ...] = ()
     right: tuple[str, ...] = ()
-    matches: int = 1
+    matches: int = setting(1, at_least=1)
     swap: bool = False
 
 
@@ -207,8 +207,8 @@ class Pairing:
 class PlaySettings:
     """How often a match is tried before it counts as failed, and the seed of the player types of the first match."""
 
-    attempts: int = 3
-    seed: int = 0
+    attempts: int = setting(3, at_least=1)
+    seed: int = setting(0, at_least=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -282,16 +282,16 @@ def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedu
     problems: list[str] = []
     known = ("play", "server", "limits", "teams", "pairings", *OTHER_SECTIONS)
     problems += [f"no section {name!r}; {choose(name, known)}" for name in table if name not in known]
-    settings = fill(PlaySettings, table.get("play", {}), "play", problems)
-    limits = fill(Limits, table.get("limits", {}), "limits", problems)
-    given = fill(ServerSpec, table.get("server", {}), "server", problems)
+    settings = from_table(PlaySettings, table.get("play", {}), "play", problems)
+    limits = from_table(Limits, table.get("limits", {}), "limits", problems)
+    given = from_table(ServerSpec, table.get("server", {}), "server", problems)
     program = _path(given.command, base, "server.command", problems) if "/" in given.command else given.command
     server = dataclasses.replace(given, command=program, options=_options(given.options, problems))
     teams: dict[str, TeamSpec] = {}
     for name, values in entries(table.get("teams", {}), "teams", dict, problems).items():
         if "name" in values:
             problems.append(f"teams.{name}.name: a team is called as its table is; leave it out")
-        team = fill(TeamSpec, {**values, "name": name}, f"teams.{name}", problems)
+        team = from_table(TeamSpec, {**values, "name": name}, f"teams.{name}", problems)
         folder = _path(team.folder, base, f"teams.{name}.folder", problems)
         teams[name] = dataclasses.replace(team, folder=folder)
         problems += [f"teams.{name}: {problem}" for problem in _wrong(teams[name])]
@@ -303,7 +303,7 @@ def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedu
     counts: dict[tuple[str, str], int] = {}
     for index, values in enumerate(pairings, 1):
         key = f"pairings {index}"
-        pairing = fill(Pairing, values, key, problems)
+        pairing = from_table(Pairing, values, key, problems)
         sides = [(left, right) for left in pairing.left for right in pairing.right]
         if not sides:
             problems.append(f"{key}: needs left and right")
@@ -330,18 +330,8 @@ def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedu
                     seed=settings.seed + count - 1,
                 )
                 fixtures.append(fixture)
-        if pairing.matches < 1:
-            problems.append(f"{key}: matches: expected at least 1, got {pairing.matches}")
-    if settings.attempts < 1:
-        problems.append(f"play.attempts: expected at least 1, got {settings.attempts}")
-    if not 0 <= settings.seed < 2**31 - len(fixtures):
-        problems.append(f"play.seed: expected a number from 0 to below 2^31, got {settings.seed}")
-    for item in fields(Limits):
-        value, may_be_none = getattr(limits, item.name), item.name in ("match_s", "silent_cycles")
-        if not 0 <= value < math.inf or not (value or may_be_none):
-            problems.append(
-                f"limits.{item.name}: expected {'at least' if may_be_none else 'more than'} 0, got {value:g}"
-            )
+    if settings.seed >= 2**31 - len(fixtures):
+        problems.append(f"play.seed: expected a number below 2^31, got {settings.seed}")
     twice = [name for name, number in Counter(fixture.id for fixture in fixtures).items() if number > 1]
     problems += [f"{name}: names two matches; call one of their teams otherwise" for name in twice]
     if problems:

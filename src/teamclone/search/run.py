@@ -22,8 +22,8 @@ from teamclone.search.trials import (
     SearchConfig,
     Status,
     Trial,
+    config_of,
     open_search,
-    with_settings,
 )
 from teamclone.search.worker import Ended, Epoch, Worker
 from teamclone.system.workers import available_cpus
@@ -111,12 +111,12 @@ def _begin(config: SearchConfig, dataset: Dataset, folder: Path) -> Search:
 def _run(state: Search, strategy: Strategy, crew: list[Worker], on_progress: Callable[[Search], None]) -> None:
     """Give trials to workers until the strategy has no more."""
     threads = state.config.base.train.threads or max(1, available_cpus() // len(crew))
-    base = with_settings(state.config.base, {"train.threads": threads})
+    base = replace(state.config.base, train=replace(state.config.base.train, threads=threads))
     while True:
         for worker in crew:
             if worker.trial is None and (trial := _next(state, strategy)):
                 trial.begin(Status.RUNNING)
-                worker.give(trial, with_settings(base, trial.settings), state.path / "trials" / trial.name)
+                worker.give(trial, config_of(trial, base), state.path / "trials" / trial.name)
                 state.save()
                 on_progress(state)
         busy = [worker for worker in crew if worker.trial]

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from teamclone.errors import UsageError
-from teamclone.models.config import ACTIVATIONS
+from teamclone.models.config import ACTIVATIONS, EgocentricTrunkConfig
 from teamclone.search.trials import (
     SETTLED,
     Mode,
@@ -19,6 +19,7 @@ from teamclone.search.trials import (
     Trial,
     rank,
 )
+from teamclone.system.settings import table_of
 from teamclone.training.config import WITH_ADAM, TrainConfig
 
 OPTIMISERS = ("adam", "rmsprop", "adagrad")
@@ -147,9 +148,10 @@ class Study:
             factor = base.data.batch_size / chosen["data.batch_size"]
             for name in ("batches_per_epoch", "validation_batches"):
                 settings[f"data.{name}"] = int(getattr(base.data, name) * factor)
-        if chosen.get("model.aims") == 0:
-            settings["model.aim_hidden"] = []
-            settings["train.aim_weight"] = 0.0
+        if chosen.get("model.target_points") == 0:
+            # Without target points these have no effect, which is refused unless they have their defaults.
+            usual = table_of(type(base.model)())
+            settings |= {f"model.{name}": usual[name] for name in ("target_hidden", "target_weight") if name in usual}
         return [Trial(name=f"{len(trials):04d}", settings=settings)]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
@@ -172,10 +174,10 @@ class Study:
         }
         if base.train.optimiser in WITH_ADAM:
             space["train.weight_decay"] = FloatDistribution(1e-5, 1e-1, log=True)
-        if base.model.features == "relative":
-            space["train.parameter_weight"] = FloatDistribution(1e-2, 1.0, log=True)
-            if base.model.aims:
-                space["model.aims"] = IntDistribution(0, 12, step=2)
+        if isinstance(base.model, EgocentricTrunkConfig):
+            space["model.parameter_weight"] = FloatDistribution(1e-2, 1.0, log=True)
+            if base.model.target_points:
+                space["model.target_points"] = IntDistribution(0, 12, step=2)
         return {key: values for key, values in space.items() if key not in self.config.held}
 
     def _study(self, trials: Sequence[Trial]) -> Any:

@@ -17,9 +17,9 @@ import numpy as np
 from teamclone import __version__
 from teamclone.errors import RunError, UsageError
 from teamclone.system.documents import not_a_document, read_document, write_document
-from teamclone.training.config import Config, config_from, to_table
+from teamclone.training.config import Config, config_from, replaced, to_table
 
-FORMAT = 1
+FORMAT = 2
 """Raised whenever a reader of the old search.json would misread the new one."""
 
 
@@ -149,17 +149,13 @@ def rank(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
     return sorted(trials, key=key)
 
 
-def with_settings(config: Config, settings: dict[str, Any]) -> Config:
-    """A config with single values replaced.
+def config_of(trial: Trial, base: Config) -> Config:
+    """Return the settings of a trial: those that all share, with its own in their places.
 
     Raises:
         UsageError: naming all that is wrong.
     """
-    table = to_table(config)
-    for key, value in settings.items():
-        section, _, name = key.partition(".")
-        table[section][name] = value
-    return config_from(table, where="trial")
+    return replaced(base, trial.settings, where=f"trial {trial.name}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

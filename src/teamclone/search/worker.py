@@ -10,6 +10,7 @@ import multiprocessing
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +23,6 @@ from teamclone.models.clone import Clone, parameter_count
 from teamclone.search.trials import (
     Status,
     Trial,
-    with_settings,
 )
 from teamclone.system.workers import start_worker
 from teamclone.training import loop
@@ -154,13 +154,13 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
             for record in history:
                 tell(record)
             # Another number of threads would round otherwise than in the epochs before.
-            config = with_settings(config, {"train.threads": run.config.train.threads})
+            config = replace(config, train=replace(config.train, threads=run.config.train.threads))
             minutes = [record["seconds"] / 60 for record in history]
             if left and minutes:
                 left -= sum(minutes)
                 if left < np.mean(minutes):
                     return Ended(Status.FINISHED, None)
-        now = with_settings(config, {"train.max_minutes": left})
+        now = replace(config, train=replace(config.train, max_minutes=left))
         loop.train(now, dataset, folder, resume=resume, on_progress=report)
     except _PrunedError:
         return Ended(Status.PRUNED, None)

@@ -11,6 +11,8 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import DatasetError, UsageError
 from teamclone.models.clone import model_id
+from teamclone.models.config import LOSS_SETTINGS, EgocentricConfig
+from teamclone.system.settings import assignment
 from teamclone.training.config import Config, override
 from teamclone.training.run import Base, Run
 
@@ -32,24 +34,25 @@ that is low, so that the base is not forgotten before the new team is learned.""
 def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
     """What `loop.train` needs to adapt a run: the settings and where to begin.
 
-    The network and its settings are those of the base, and so is the normalisation of its inputs, so that each input
-    means what it meant. The other settings are those of the base but for SETTINGS, kicks in proportion to the batch,
-    and what ``overrides`` say, each ``section.key=value``.
+    The network is that of the base, and so is the normalisation of its inputs, so that each input keeps its meaning.
+    The settings are those of the base but for SETTINGS, extra kicks in proportion to the batch, and ``overrides``, each
+    ``section.key=value``.
 
     Raises:
-        UsageError: a setting is unknown or wrong, or one of the network's.
+        UsageError: a setting is unknown or wrong, or would change the network.
         RunError: the base has no CHECKPOINT, or it is damaged.
     """
-    fixed = [text.partition("=")[0].strip() for text in overrides if text.strip().startswith("model.")]
+    keys = [assignment(text)[0] for text in overrides]
+    fixed = [key for key in keys if key.startswith("model.") and key.removeprefix("model.") not in LOSS_SETTINGS]
     if fixed:
         raise UsageError(
             f"--set: {', '.join(fixed)} cannot be changed, an adapted clone has the network of its base; "
-            "expected settings of data and train, or train a new clone with `teamclone train`"
+            "expected settings of data, train or the loss, or train a new clone with `teamclone train`"
         )
     config = override(base.config, [*SETTINGS, *overrides])
-    if not any(text.partition("=")[0].strip() == "train.kicks" for text in overrides):
+    if isinstance(base.config.model, EgocentricConfig) and "model.extra_kicks" not in keys:
         share = config.data.batch_size / base.config.data.batch_size
-        config = override(config, [f"train.kicks={math.ceil(share * base.config.train.kicks)}"])
+        config = override(config, [f"model.extra_kicks={math.ceil(share * base.config.model.extra_kicks)}"])
     model = base.load_model(CHECKPOINT)
     origin = {
         "path": str(base.path),

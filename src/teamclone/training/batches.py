@@ -27,7 +27,7 @@ CARD_SHARE = 0.8
 MAKE_ROWS = 8192
 """Samples whose inputs are made at once; bounds memory."""
 CACHE_ROWS = 1024
-"""The same on a processor for inputs that are kept: what one step of it leaves is still in the cache for the next."""
+"""Samples at once on a processor, for inputs that are kept: the data of one step is still in its cache for the next."""
 MEAN_ROWS = 2**17
 """Training samples that mean positions are taken over, evenly spread."""
 
@@ -56,7 +56,7 @@ class Batches:
     fit there, and all that is done with them is done there.
 
     Args:
-        keep_bytes: how much memory kept inputs may take.
+        cache_bytes: memory that inputs made once may take.
         rows: all samples that batches will be asked for.
         mirrored: samples by which players' counterparts are found, if batches will be asked for mirrored samples.
         on_progress: told how many of them are made, and how many there are.
@@ -69,7 +69,7 @@ class Batches:
         device: torch.device,
         group: Group,
         *,
-        keep_bytes: float = 0.0,
+        cache_bytes: float = 0.0,
         rows: NDArray[np.int64] | None = None,
         mirrored: NDArray[np.int64] | None = None,
         on_progress: Callable[[int, int], None] = lambda done, total: None,
@@ -85,25 +85,25 @@ class Batches:
         self.dataset = dataset.to(device) if self.on_card else dataset
         self.quick = not self.on_card and type(model.features) is PaperFeatures and mirrored is None
         self._gather: Gather | None = None
-        self._kept: _Kept | None = None
+        self._cache: _Cache | None = None
         if self.on_card:
-            keep_bytes = min(keep_bytes, CARD_SHARE * torch.cuda.mem_get_info(device)[0])
-        if not self.quick and rows is not None and 4 * len(self.inputs.names) * len(rows) <= keep_bytes:
-            self._kept = self._keep(rows, on_progress)
-        self.ahead = not self.on_card and (device.type != "cpu" or self._kept is None)
+            cache_bytes = min(cache_bytes, CARD_SHARE * torch.cuda.mem_get_info(device)[0])
+        if not self.quick and rows is not None and 4 * len(self.inputs.names) * len(rows) <= cache_bytes:
+            self._cache = self._filled(rows, on_progress)
+        self.ahead = not self.on_card and (device.type != "cpu" or self._cache is None)
 
-    def _keep(self, rows: NDArray[np.int64], on_progress: Callable[[int, int], None]) -> _Kept:
+    def _filled(self, rows: NDArray[np.int64], on_progress: Callable[[int, int], None]) -> _Cache:
         where = self.device if self.on_card else torch.device("cpu")
-        kept = _Kept(rows, n=len(self.dataset), columns=len(self.inputs.names), where=where)
+        cache = _Cache(rows, n=len(self.dataset), columns=len(self.inputs.names), where=where)
         at_once = MAKE_ROWS if self.on_card else CACHE_ROWS
         starts = range(0, len(rows), at_once)
         # Two threads even where one is asked for: one waits for memory while the other computes.
         with ThreadPoolExecutor(max(2, torch.get_num_threads())) as pool:
             parts = pool.map(self._made, [rows[start : start + at_once] for start in starts])
             for start, made in zip(starts, parts, strict=True):
-                kept.columns[start : start + len(made)] = made
+                cache.columns[start : start + len(made)] = made
                 on_progress(start + len(made), len(rows))
-        return kept
+        return cache
 
     @torch.no_grad()
     def _made(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
@@ -113,8 +113,8 @@ class Batches:
         return self.inputs.project(self.dataset.state(rows, history=self.inputs.history).to(self.device))
 
     def _columns(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
-        """The same, from what is kept if they are among it."""
-        return self._made(rows) if self._kept is None else self._kept(rows).to(self.device)
+        """Return (rows, columns) inputs before normalisation, from the cache if it is on, on the device."""
+        return self._made(rows) if self._cache is None else self._cache(rows).to(self.device)
 
     def columns(self, rows: NDArray[np.int64]) -> Iterator[Tensor]:
         """Inputs of samples before normalisation, in chunks, in the memory of the processor."""
@@ -168,7 +168,7 @@ class Batches:
         return Batch(self.inputs.normalise(columns), target, whole)
 
 
-class _Kept:
+class _Cache:
     """Inputs of some of ``n`` samples before normalisation, (len(rows), columns), in the memory ``where``."""
 
     def __init__(self, rows: NDArray[np.int64], *, n: int, columns: int, where: torch.device) -> None:

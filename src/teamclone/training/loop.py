@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -21,8 +21,8 @@ from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError
 from teamclone.models.answer import Answer
 from teamclone.models.clone import Clone
+from teamclone.models.config import EgocentricConfig
 from teamclone.models.heads.mixture import WITH_BALL, with_ball
-from teamclone.models.loss import Loss, ParameterLoss
 from teamclone.training.batches import Batch
 from teamclone.training.calibration import Calibration
 from teamclone.training.config import Config, TrainConfig
@@ -115,12 +115,11 @@ def _train_epoch(setup: Setup, epoch: int, on_progress: Callable[[Progress], Non
         for weights in optimiser.param_groups:
             weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
         answered = answer(model, inputs, precision=setup.precision, kicks=with_ball(target))
-        loss = _loss(setup, answered, Batch(inputs, target, whole), balance=setup.balance)
+        loss = model.loss(answered, target, balance=setup.balance, whole=whole)
         error = loss.total
         for kick_inputs, kick_target, whole_kicks in islice(kicks, 1):
             with torch.autocast(setup.device.type, torch.bfloat16, enabled=setup.precision == "bf16"):
-                taught = model.kick_loss(kick_inputs, kick_target, of=len(whole_kicks))
-            error = error + config.train.parameter_weight * taught
+                error = error + model.kick_loss(kick_inputs, kick_target, of=len(whole_kicks))
         optimiser.zero_grad(set_to_none=True)
         error.backward()  # type: ignore[no-untyped-call]
         setup.group.add_up_gradients(model)
@@ -141,7 +140,7 @@ def _validate(setup: Setup) -> dict[str, Any]:
     metrics, calibration = RunningMetrics(setup.device, commands), Calibration(setup.device, commands)
     for inputs, target, whole in setup.batches.batches(setup.validation_rows, config.data.batch_size):
         answered = answer(model, inputs, precision=setup.precision, kicks=with_ball(target))
-        loss = _loss(setup, answered, Batch(inputs, target, whole))
+        loss = model.loss(answered, target, whole=whole)
         metrics.add(loss, answered.point(), target, batch=len(whole))
         if config.train.calibrate:
             calibration.add(answered.raw_logits, target.kind)
@@ -152,20 +151,6 @@ def _validate(setup: Setup) -> dict[str, Any]:
         record["validation_cross_entropy"] -= gained
         record["validation_loss"] -= gained
     return record
-
-
-def _loss(setup: Setup, answered: Answer, batch: Batch, **balance: Any) -> Loss:
-    train = setup.config.train
-    loss: Loss = setup.model.loss(
-        answered,
-        batch.target,
-        parameter_loss=cast(ParameterLoss, train.parameter_loss),
-        weight=train.parameter_weight,
-        aim_weight=train.aim_weight,
-        whole=batch.whole,
-        **balance,
-    )
-    return loss
 
 
 def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kicks: Tensor | None = None) -> Answer:
@@ -201,14 +186,15 @@ def _epoch_rows(setup: Setup, epoch: int) -> tuple[NDArray[np.int64], NDArray[np
 
 def _extra_kicks(setup: Setup, *, epoch: int, batches: int) -> Iterator[Batch]:
     """Give the kicks and tackles to show beside the batches of an epoch; each sample comes as often as any other."""
-    config = setup.config.train
+    seed, model = setup.config.train.seed, setup.config.model
+    each = model.extra_kicks if isinstance(model, EgocentricConfig) else 0
     rows = setup.rows[np.isin(setup.kinds, WITH_BALL)]
-    wanted = batches * config.kicks
+    wanted = batches * each
     if not wanted or not len(rows):
         return iter(())
-    random = np.random.default_rng((config.seed, 3, epoch))
+    random = np.random.default_rng((seed, 3, epoch))
     order = np.concatenate([random.permutation(rows) for _ in range(math.ceil(wanted / len(rows)))])[:wanted]
-    return setup.batches.batches(order, config.kicks)
+    return setup.batches.batches(order, each)
 
 
 def _ends_late(config: TrainConfig, *, done: int, seconds: float) -> bool:

@@ -38,7 +38,7 @@ from teamclone.system.machine import processor
 from teamclone.training.checkpoint import load_weights, save_weights
 from teamclone.training.config import Config, config_from, to_toml
 
-FORMAT = 3
+FORMAT = 4
 """Raised whenever a reader of the old folder would misread the new one."""
 
 RESUME = "resume"

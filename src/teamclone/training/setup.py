@@ -104,7 +104,7 @@ def prepare(
         model,
         device,
         group,
-        keep_bytes=config.data.keep_gb * 1e9,
+        cache_bytes=config.data.cache_gb * 1e9,
         rows=np.concatenate([rows, validation_rows]),
         mirrored=rows if config.data.mirror else None,
         on_progress=on_progress,

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from teamclone.models.answer import Answer
 from teamclone.models.clone import Clone
-from teamclone.models.config import ModelConfig
+from teamclone.models.config import EgocentricConfig, ModelConfig, PaperConfig
 from teamclone.models.distributions import (
     Mixture,
     angle_terms,
@@ -29,24 +29,25 @@ from teamclone.models.heads.point import POINT_SCALE, PointAnswer
 from teamclone.rcss.commands import CLONED, REPERTOIRE, parameters_of
 from teamclone.world.state import Target
 
-PAPER = ModelConfig(hidden=(16,), commands=REPERTOIRE)
-MIXTURE = ModelConfig(
-    features="relative",
+PAPER = PaperConfig(hidden=(16,), commands=REPERTOIRE)
+MIXTURE = EgocentricConfig(
     blocks=("self", "role", "ball"),
     kick_blocks=("ball", "mates"),
-    aims=2,
-    aim_hidden=(16,),
+    target_points=2,
+    target_hidden=(16,),
     parameter_hidden=(16,),
     kick_hidden=(16,),
     hidden=(16,),
-    head="mixture",
     commands=REPERTOIRE,
+    kick_attention=0,
+    kick_dropout=0.0,
+    target_weight=0.0,
 )
 HEADS = {
     "point": PAPER,
-    "point ensemble": replace(PAPER, members=3),
+    "point ensemble": replace(PAPER, ensemble_size=3),
     "mixture": MIXTURE,
-    "mixture ensemble": replace(MIXTURE, members=2),
+    "mixture ensemble": replace(MIXTURE, ensemble_size=2),
 }
 N = 20_000
 EVERY = pytest.mark.parametrize("config", HEADS.values(), ids=HEADS.keys())

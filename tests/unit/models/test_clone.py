@@ -8,10 +8,18 @@ import torch
 from tests.situations import situations
 from torch import Tensor
 
+from teamclone.models.answer import Answer
 from teamclone.models.clone import Clone, parameter_count
-from teamclone.models.config import ACTIVATIONS, BLOCKS, ModelConfig
+from teamclone.models.config import (
+    ACTIVATIONS,
+    BLOCKS,
+    EgocentricConfig,
+    EgocentricPointConfig,
+    ModelConfig,
+    PaperConfig,
+)
 from teamclone.models.heads.mixture import with_ball
-from teamclone.models.loss import Balance
+from teamclone.models.loss import Balance, Loss
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 from teamclone.rcss.player_types import FIELDS
 from teamclone.training.config import load_config
@@ -38,13 +46,13 @@ def test_the_papers_architecture() -> None:
         return sum((a + 1) * b for a, b in pairwise(widths))
 
     heads = 129 * (4 + 6)
-    assert parameter_count(Clone(ModelConfig())) == layers(119, 512, 256, 128) + heads
-    assert parameter_count(Clone(ModelConfig(own_type=True))) == layers(127, 512, 256, 128) + heads
-    assert parameter_count(Clone(ModelConfig(hidden=(32,)))) == layers(119, 32) + 33 * 10
+    assert parameter_count(Clone(PaperConfig())) == layers(119, 512, 256, 128) + heads
+    assert parameter_count(Clone(PaperConfig(own_type=True))) == layers(127, 512, 256, 128) + heads
+    assert parameter_count(Clone(PaperConfig(hidden=(32,)))) == layers(119, 32) + 33 * 10
 
 
 def test_answers_are_probabilities_and_bounded_parameters() -> None:
-    model = Clone(ModelConfig())
+    model = Clone(PaperConfig())
     with torch.no_grad():
         model.head.parameter.weight.mul_(1000)
     probabilities, parameters = model.predict(random_state(50))
@@ -55,7 +63,7 @@ def test_answers_are_probabilities_and_bounded_parameters() -> None:
 
 
 def test_rows_do_not_depend_on_each_other() -> None:
-    model = Clone(ModelConfig())
+    model = Clone(PaperConfig())
     state = random_state(17)
     whole = model.predict(state)
     for row in (0, 16):
@@ -70,12 +78,12 @@ def test_every_activation_changes_the_answer(activation: str) -> None:
     answers = []
     for name in ("relu", activation):
         torch.manual_seed(0)
-        answers.append(Clone(ModelConfig(activation=name)).predict(state)[0])
+        answers.append(Clone(PaperConfig(activation=name)).predict(state)[0])
     assert torch.equal(*answers) == (activation == "relu")
 
 
 def test_overfits_sixty_four_samples() -> None:
-    model = Clone(ModelConfig())
+    model = Clone(PaperConfig())
     state = random_state(64)
     kind = torch.randint(0, 4, (64,))
     limits = torch.tensor([[100.0, 180.0], [180.0, 0.0], [100.0, 180.0], [180.0, 0.0]])
@@ -92,25 +100,28 @@ def test_overfits_sixty_four_samples() -> None:
     assert loss.parameters.item() < 1e-3
 
 
-RELATIVE = ModelConfig(
-    features="relative",
+RELATIVE = EgocentricConfig(
     blocks=("self", "role", "type", "ball", "reach", "lines"),
     kick_blocks=("self", "last", "ball", "mates", "opponents"),
-    aims=4,
-    aim_hidden=(32,),
+    target_points=4,
+    target_hidden=(32,),
     parameter_hidden=(64,),
     kick_hidden=(64,),
     hidden=(128, 64),
-    head="mixture",
+    kick_attention=0,
+    kick_dropout=0.0,
+    target_weight=0.0,
 )
-SMALL = replace(RELATIVE, hidden=(16,), parameter_hidden=(16,), kick_hidden=(16,), aim_hidden=(8,))
+SMALL = replace(RELATIVE, hidden=(16,), parameter_hidden=(16,), kick_hidden=(16,), target_hidden=(8,))
 MODELS = {
     "mixture": SMALL,
-    "no aims": replace(SMALL, aims=0, aim_hidden=()),
-    "one aim": replace(SMALL, aims=1),
+    "no target points": replace(SMALL, target_points=0, target_hidden=()),
+    "one target point": replace(SMALL, target_points=1),
     "no kick blocks": replace(SMALL, kick_blocks=()),
     "no role": replace(SMALL, blocks=("ball",)),
-    "point": replace(SMALL, head="point", kick_blocks=(), kick_hidden=(), parameter_hidden=()),
+    "point": EgocentricPointConfig(
+        blocks=RELATIVE.blocks, target_points=4, target_hidden=(8,), hidden=(16,), parameter_loss="paper"
+    ),
     "past": replace(SMALL, blocks=("self", "past")),
     "attention": replace(SMALL, kick_attention=8),
     "plan": replace(SMALL, kick_attention=8, kick_blocks=("ball", "plan")),
@@ -119,7 +130,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("config", MODELS.values(), ids=MODELS)
-def test_relative_models_answer_alike_alone_and_in_batches(config: ModelConfig) -> None:
+def test_egocentric_models_answer_alike_alone_and_in_batches(config: ModelConfig) -> None:
     model = Clone(config).eval()
     state = situations(17, history=model.inputs.history)
     model.inputs.fit([model.inputs.project(state)])
@@ -128,7 +139,7 @@ def test_relative_models_answer_alike_alone_and_in_batches(config: ModelConfig) 
     assert parameters.isfinite().all()
     limits = torch.tensor([100.0, 180.0, 180.0, 100.0, 180.0, 180.0])
     assert (parameters.abs() <= limits + 1e-3).all()
-    if config.head == "mixture":
+    if isinstance(config, EgocentricConfig):
         assert (parameters[:, [0, 3]] >= 0).all()
     for rows in (slice(0, 1), slice(16, 17), slice(4, 7)):
         part = model.predict(state.select(rows))
@@ -244,31 +255,42 @@ def test_parameters_teach_neither_the_layers_of_the_command_nor_the_aims() -> No
     likelihood = output.log_likelihood(target)
     for index, kind in enumerate(CLONED_KINDS):
         assert taught(likelihood[target.kind == index].sum(), model) == by_kind[kind]
-    loss = model.loss(output, target, weight=1.0)
+    loss = model.loss(output, target)
     assert taught(loss.parameters, model) == set.union(*by_kind.values())
-    assert taught(loss.cross_entropy, model) == {"trunk.aims", "trunk.command", "head.command"}
+    assert taught(loss.cross_entropy, model) == {"trunk.targets", "trunk.command", "head.command"}
 
 
-def test_turns_teach_the_aims_and_nothing_else_through_their_own_bell() -> None:
+def test_turns_teach_the_target_points_and_nothing_else_by_their_own_density() -> None:
     model = Clone(RELATIVE)
     state = situations(64)
     target = likely_target(state)
     model.inputs.fit([model.inputs.project(state)])
     output = model.answer(state)
-    plain, aimed = (model.loss(output, target, aim_weight=weight) for weight in (0.0, 0.5))
+
+    def loss_of(answer: Answer, target: Target, *, targets: float, balance: Balance | None = None) -> Loss:
+        model.head.target_weight = targets
+        return model.loss(answer, target, balance=balance)
+
+    plain, aimed = (loss_of(output, target, targets=weight) for weight in (0.0, 0.5))
     assert aimed.parameters == plain.parameters
     assert aimed.total > plain.total
     nothing_else = Balance(weight=torch.zeros(4), shift=torch.zeros(4))
-    alone = model.loss(output, target, weight=0.0, aim_weight=0.5, balance=nothing_else)
+    model.head.parameter_weight = 0.0
+    alone = loss_of(output, target, targets=0.5, balance=nothing_else)
+    model.head.parameter_weight = 1.0
     assert alone.total.item() == pytest.approx((aimed.total - plain.total).item(), rel=1e-4)
-    assert taught(alone.total, model) == {"trunk.aims"}
+    assert taught(alone.total, model) == {"trunk.targets"}
     turns = target.kind == CLONED_KINDS.index(CommandKind.TURN)
     without = Target(target.kind[~turns], target.parameters[~turns])
     others = model.answer(state.select(~turns))
-    assert model.loss(others, without, aim_weight=0.5).total == model.loss(others, without).total
+    assert loss_of(others, without, targets=0.5).total == loss_of(others, without, targets=0.0).total
 
 
-@pytest.mark.parametrize("config", [SMALL, replace(SMALL, members=2), MODELS["plan"]], ids=("one", "two", "plan"))
+@pytest.mark.parametrize(
+    "config",
+    [replace(SMALL, target_weight=0.3), replace(SMALL, ensemble_size=2), MODELS["plan"]],
+    ids=("one", "two", "plan"),
+)
 def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> None:
     """What is asked for is the same, and the rest of the answer, too."""
     model = Clone(config).eval()
@@ -281,7 +303,7 @@ def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> 
     with torch.no_grad():
         whole, asked = model.answer_inputs(inputs), model.answer_inputs(inputs, kicks=rows)
         likelihoods = [output.log_likelihood(target) for output in (whole, asked)]
-        losses = [torch.stack(model.loss(output, target, aim_weight=0.3)) for output in (whole, asked)]
+        losses = [torch.stack(model.loss(output, target)) for output in (whole, asked)]
         points = [output.point() for output in (whole, asked)]
     torch.testing.assert_close(*likelihoods, atol=1e-4, rtol=1e-4)
     torch.testing.assert_close(*losses, atol=1e-4, rtol=1e-4)

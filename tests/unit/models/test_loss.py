@@ -92,14 +92,14 @@ def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterL
 def test_the_mixtures_loss_by_hand() -> None:
     logits = torch.log(torch.tensor([[0.7, 0.1, 0.1, 0.1], [0.25, 0.25, 0.25, 0.25]]))
     target = Target(*(part[:2] for part in TARGET))
-    likelihood, aims = torch.tensor([-1.0, -3.0]), torch.tensor([0.0, -8.0])
+    likelihood, to_targets = torch.tensor([-1.0, -3.0]), torch.tensor([0.0, -8.0])
     cross_entropy = -(log(0.7) + log(0.25)) / 2
-    loss = mixture_loss(logits, likelihood, target, aims=aims, weight=0.5, aim_weight=0.1)
+    loss = mixture_loss(logits, likelihood, target, to_targets=to_targets, weight=0.5, target_weight=0.1)
     # The mean is over all commands: half of them turn.
     assert [float(part) for part in loss] == pytest.approx([cross_entropy + 0.5 * 2 + 0.1 * 4, cross_entropy, 2])
     for untaught in (
-        mixture_loss(logits, likelihood, target, aims=aims),
-        mixture_loss(logits, likelihood, target, aim_weight=9.0),
+        mixture_loss(logits, likelihood, target, to_targets=to_targets),
+        mixture_loss(logits, likelihood, target, target_weight=9.0),
     ):
         assert [float(part) for part in untaught] == pytest.approx([cross_entropy + 2, cross_entropy, 2])
     shares = [
@@ -107,9 +107,9 @@ def test_the_mixtures_loss_by_hand() -> None:
             logits[row : row + 1],
             likelihood[row : row + 1],
             Target(target.kind[row : row + 1], target.parameters[row : row + 1]),
-            aims=aims[row : row + 1],
+            to_targets=to_targets[row : row + 1],
             weight=0.5,
-            aim_weight=0.1,
+            target_weight=0.1,
             whole=target.kind,
         )
         for row in range(2)

@@ -20,9 +20,9 @@ from teamclone.search.trials import (
     SearchConfig,
     Status,
     Trial,
+    config_of,
     open_search,
     rank,
-    with_settings,
 )
 from teamclone.training.config import load_config
 
@@ -150,7 +150,7 @@ def test_a_study_proposes_settings_that_can_be_trained() -> None:
         base = plan.config.base
         seen: dict[str, set[Any]] = {}
         for trial in told(plan, 40):
-            config = with_settings(base, trial.settings)
+            config = config_of(trial, base)
             samples = [
                 of.data.batch_size * n
                 for of in (base, config)
@@ -162,19 +162,20 @@ def test_a_study_proposes_settings_that_can_be_trained() -> None:
         assert seen["model.activation"] == set(ACTIVATIONS)
         assert seen["data.batch_size"] == {"1024", "2048", "4096", "8192"}
         assert len(seen["train.learning_rate"]) == 40
-        assert ("train.parameter_weight" in seen) == ("model.aims" in seen) == (preset == "best")
+        assert ("model.parameter_weight" in seen) == ("model.target_points" in seen) == (preset == "best")
 
 
-def test_a_study_may_leave_the_aims_out() -> None:
+def test_a_study_may_leave_the_target_points_out() -> None:
     plan = study("best", trials=40)
-    plan = study("best", trials=40, held=tuple(plan.space().keys() - {"model.aims"}))
+    held = tuple(plan.space().keys() - {"model.target_points"})
+    plan = study("best", ("model.target_hidden=[64]",), trials=40, held=held)
     trials: list[Trial] = []
     while found := plan.propose(trials):
         trials.append(finish(found[0], 0.5))
-    configs = [with_settings(plan.config.base, trial.settings) for trial in trials]
-    assert {config.model.aims for config in configs} == {0, 2, 4, 6, 8, 10, 12}
+    configs = [config_of(trial, plan.config.base) for trial in trials]
+    assert {config.model.target_points for config in configs} == {0, 2, 4, 6, 8, 10, 12}
     for config in configs:
-        assert bool(config.model.aims) == bool(config.model.aim_hidden) == bool(config.train.aim_weight)
+        assert config.model.target_hidden == ((64,) if config.model.target_points else (512, 256))
 
 
 def test_a_study_is_the_same_whenever_it_is_gone_on_with() -> None:
@@ -189,8 +190,7 @@ def test_a_study_is_the_same_whenever_it_is_gone_on_with() -> None:
 def test_a_study_varies_neither_what_is_held_nor_what_has_no_effect() -> None:
     assert "train.learning_rate" not in study(held=("train.learning_rate",)).space()
     assert "train.weight_decay" not in study("paper", ("train.optimiser=adagrad",)).space()
-    no_aims = ("model.aims=0", "model.aim_hidden=[]", "train.aim_weight=0")
-    assert "model.aims" not in study("best", no_aims).space()
+    assert "model.target_points" not in study("best", ("model.target_points=0",)).space()
     assert (
         768
         not in study("paper", ("data.batch_size=384", "data.batches_per_epoch=3")).space()["data.batch_size"].choices
@@ -219,7 +219,7 @@ def test_a_study_gives_up_what_is_worse_than_the_median(objective: Objective) ->
 def test_the_comparison_of_optimisers(preset: str) -> None:
     base = load_config(preset)
     trials = Optimisers(SearchConfig(mode=Mode.OPTIMISERS, base=base)).propose([])
-    configs = [with_settings(base, trial.settings).train for trial in trials]
+    configs = [config_of(trial, base).train for trial in trials]
     assert [(of.optimiser, of.learning_rate) for of in configs] == [
         (optimiser, rate) for optimiser in ("adam", "rmsprop", "adagrad") for rate in (0.01, 0.001, 0.0001)
     ]
@@ -283,8 +283,8 @@ def test_a_folder_that_is_no_search_is_refused(tmp_path: Path) -> None:
     for text, words in (
         ("[]", "not the description of a search"),
         ("{", "not the description of a search"),
-        (json.dumps({"format": 1, "mode": "beam"}), "not the description of a search"),
-        (json.dumps({"format": 99}), "search of format 99, this version reads 1"),
+        (json.dumps({"format": 2, "mode": "beam"}), "not the description of a search"),
+        (json.dumps({"format": 99}), "search of format 99, this version reads 2"),
     ):
         (tmp_path / "search.json").write_text(text)
         with pytest.raises(RunError, match=words):

@@ -18,7 +18,7 @@ from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError
 from teamclone.logs import read_match
 from teamclone.models.clone import Clone
-from teamclone.models.config import ModelConfig
+from teamclone.models.config import EgocentricPointConfig, ModelConfig, PaperConfig
 from teamclone.models.inputs.paper import PaperFeatures
 from teamclone.store import create_store
 from teamclone.training.batches import Batches, counterparts
@@ -29,10 +29,10 @@ from teamclone.world.mirror import mirror_state, mirror_target
 
 CPU = torch.device("cpu")
 CONFIGS = (
-    ModelConfig(),
-    ModelConfig(own_type=True),
-    ModelConfig(all_types=("stamina", "movement")),
-    ModelConfig(own_type=True, all_types=("movement", "kick", "stamina")),
+    PaperConfig(),
+    PaperConfig(own_type=True),
+    PaperConfig(all_types=("stamina", "movement")),
+    PaperConfig(own_type=True, all_types=("movement", "kick", "stamina")),
 )
 
 
@@ -100,11 +100,11 @@ def test_an_index_that_points_at_nothing_is_told(
     np.save(tmp_path / "ds" / f"{array}.npy", values)
     damaged = open_dataset(tmp_path / "ds")
     with pytest.raises(DatasetError, match=r"sample \d points at nothing; make the dataset again"):
-        Gather(damaged, Clone(ModelConfig()).features)(np.arange(20))
+        Gather(damaged, Clone(PaperConfig()).features)(np.arange(20))
 
 
 def test_rows_beyond_the_dataset_are_told(made: Dataset) -> None:
-    gather = Gather(made, Clone(ModelConfig()).features)
+    gather = Gather(made, Clone(PaperConfig()).features)
     for row in (-1, len(made)):
         with pytest.raises(DatasetError, match=f"sample {row} points at nothing"):
             gather(np.array([0, row]))
@@ -156,7 +156,10 @@ def test_other_features_are_asked_themselves(made: Dataset) -> None:
     assert torch.equal(batch.inputs, 2 * plain)
 
 
-RELATIVE = ModelConfig(features="relative", blocks=("self", "role", "ball", "mates", "past"))
+RELATIVE = EgocentricPointConfig(
+    blocks=("self", "role", "ball", "mates", "past"),
+    target_points=0,
+)
 
 
 @pytest.mark.parametrize("config", [CONFIGS[0], RELATIVE])
@@ -175,7 +178,7 @@ def test_mirrored_samples_among_others(made: Dataset, config: ModelConfig, kept:
             model,
             CPU,
             Group(rank=rank, size=size),
-            keep_bytes=kept * table * 800,
+            cache_bytes=kept * table * 800,
             rows=rows[:800],
             mirrored=training,
             on_progress=lambda *done: told.append(done),
@@ -206,8 +209,8 @@ def test_kept_inputs_are_those_made_anew(made: Dataset) -> None:
     """But for rounding, which hangs on how many are made at once."""
     model = fitted(made, RELATIVE)
     rows = np.random.default_rng(0).permutation(len(made))
-    kept = Batches(made, model, CPU, ALONE, keep_bytes=1e9, rows=rows[:500])
-    anew = Batches(made, model, CPU, ALONE, keep_bytes=0, rows=rows[:500])
+    kept = Batches(made, model, CPU, ALONE, cache_bytes=1e9, rows=rows[:500])
+    anew = Batches(made, model, CPU, ALONE, cache_bytes=0, rows=rows[:500])
     assert (kept.ahead, anew.ahead) == (False, True)
     for one, other in zip(kept.batches(rows[:300], 77), anew.batches(rows[:300], 77), strict=True):
         assert torch.allclose(one.inputs, other.inputs, rtol=1e-5, atol=1e-6)

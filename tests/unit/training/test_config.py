@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teamclone.errors import UsageError
+from teamclone.models.config import EgocentricConfig, EgocentricPointConfig, PaperConfig
 from teamclone.training.config import (
     Config,
     config_from,
@@ -19,8 +20,6 @@ from teamclone.training.config import (
     to_toml,
 )
 
-TABLE = to_table(Config())
-
 
 def test_the_paper_preset_is_table_three() -> None:
     config = load_config("paper")
@@ -32,21 +31,22 @@ def test_the_paper_preset_is_table_three() -> None:
     assert config.train.learning_rate == 0.001
     assert config.train.betas == (0.9, 0.999)
     assert config.train.epsilon == 1e-7
-    assert config.train.parameter_loss == "paper"
+    assert config.model.parameter_loss == "paper"
     assert config.model.hidden == (512, 256, 128)
     assert config.model.activation == "relu"
     assert config == Config()
 
 
-def test_small_is_the_same_network() -> None:
-    assert load_config("small").model == load_config("paper").model
+def test_presets_have_the_networks_of_their_families() -> None:
+    assert load_config("small").model == load_config("paper").model == PaperConfig()
+    assert load_config("best").model == EgocentricConfig()
 
 
 @pytest.mark.parametrize("name", preset_names())
 def test_presets_say_every_setting_and_survive_a_round_trip(name: str) -> None:
     table = tomllib.loads(preset_text(name))
-    assert {key: set(values) for key, values in table.items()} == {key: set(values) for key, values in TABLE.items()}
     config = load_config(name)
+    assert {key: set(of) for key, of in table.items()} == {key: set(of) for key, of in to_table(config).items()}
     assert config_from(tomllib.loads(to_toml(config)), where="x") == config
 
 
@@ -99,8 +99,8 @@ def test_overrides_are_read_as_their_setting_wants() -> None:
     [
         ("train.learning_rat=1", "no setting 'train.learning_rat'; did you mean train.learning_rate"),
         ("epochs=3", "no setting 'epochs'; did you mean train.epochs?"),
-        ("zzz=1", "no setting 'zzz'; choose from model.features"),
-        ("train.epochs", "expected section.key=value, got 'train.epochs'"),
+        ("zzz=1", "no setting 'zzz'; choose from model.family"),
+        ("train.epochs", "expected KEY=VALUE, got 'train.epochs'"),
         ("train.epochs=many", "train.epochs: expected a whole number, got 'many'"),
         ("train.epochs=1.5", "train.epochs: expected a whole number, got 1.5"),
         ("train.epochs=true", "train.epochs: expected a whole number, got True"),
@@ -111,18 +111,17 @@ def test_overrides_are_read_as_their_setting_wants() -> None:
         ("train.max_minutes=inf", "train.max_minutes: expected a finite number"),
         ("train.max_minutes=nan", "train.max_minutes: expected at least 0"),
         ("train.optimiser=adm", "train.optimiser: no 'adm'; did you mean adam"),
-        ("train.betas=[0.9]", "train.betas: expected two numbers"),
-        ("train.betas=[0.9, 1.0]", "train.betas: expected two numbers"),
+        ("train.betas=[0.9]", "train.betas: expected 2 values, got [0.9]"),
+        ("train.betas=[0.9, 1.0]", "train.betas: expected a number below 1, got 1.0"),
         ("model.own_type=1", "model.own_type: expected true or false, got 1"),
         ("model.all_types=[1]", "model.all_types: expected a word, got 1"),
         ("model.all_types=kik", "model.all_types: no 'kik'; did you mean kick?"),
         ("model.all_types=kick,kick", "model.all_types: names one more than once"),
-        ("model.hidden=[]", "model.hidden: expected at least one width"),
+        ("model.hidden=[]", "model.hidden: expected at least one value, got none"),
         ("model.hidden=[0]", "model.hidden: expected at least 1, got 0"),
-        ("model.parameter_hidden=[0]", "model.parameter_hidden: expected at least 1, got 0"),
-        ("model.kick_dropout=1", "model.kick_dropout: expected at most 0.9, got 1"),
-        ("train.aim_weight=-1", "train.aim_weight: expected at least 0, got -1"),
-        ("model.features=papr", "model.features: no 'papr'; did you mean paper?"),
+        ("model.family=papr", "model.family: no 'papr'; did you mean paper?"),
+        ("model.kick_dropout=0.1", "no setting 'model.kick_dropout'; it is of the family egocentric, this is paper"),
+        ("model.blocks=self", "it is of the family egocentric or egocentric-point, this is paper"),
     ],
 )
 def test_mistakes_are_named(text: str, answer: str) -> None:
@@ -152,85 +151,53 @@ def test_commands_have_their_order(text: str) -> None:
         load_config("paper", [f"model.commands={text}"])
 
 
-MIXTURE = ["model.head=mixture", "model.parameter_hidden=[8]", "model.kick_hidden=[8]"]
-
-
 @pytest.mark.parametrize(
-    ("settings", "answer"),
+    ("text", "answer"),
     [
-        (
-            ["train.optimiser=adagrad", "train.weight_decay=0.1"],
-            "train.weight_decay has no effect with train.optimiser",
-        ),
-        (["model.blocks=self"], "model.blocks has no effect with model.features = paper"),
-        (["model.kick_blocks=self"], "model.kick_blocks has no effect with model.features = paper"),
-        (["model.aims=2"], "model.aims has no effect with model.features = paper"),
-        (["model.aim_hidden=[8]"], "model.aim_hidden has no effect with model.features = paper"),
-        (["model.kick_hidden=[8]"], "model.kick_hidden has no effect with model.features = paper"),
-        (["model.parameter_hidden=[8]"], "model.parameter_hidden has no effect with model.features = paper"),
-        (["model.kick_dropout=0.1"], "model.kick_dropout has no effect with model.features = paper"),
-        (["model.kick_attention=8"], "model.kick_attention has no effect with model.features = paper"),
-        (["train.kicks=8"], "train.kicks has no effect with model.features = paper"),
-        (["train.aim_weight=0.1"], "train.aim_weight has no effect with model.head = point"),
-        (["model.head=mixture"], "model.head = mixture needs model.features = relative"),
-        (["model.features=relative", "model.own_type=true"], "model.own_type has no effect with model.features = rel"),
-        (
-            ["model.features=relative", "model.all_types=kick"],
-            "model.all_types has no effect with model.features = rel",
-        ),
-        (["model.features=relative", "model.aims=2"], "model.aims and model.aim_hidden need each other"),
-        (["model.features=relative", "model.aim_hidden=[8]"], "model.aims and model.aim_hidden need each other"),
-        (
-            ["model.features=relative", "model.kick_blocks=self"],
-            "model.kick_blocks has no effect with model.head = poi",
-        ),
-        (
-            ["model.features=relative", "model.kick_hidden=[8]"],
-            "model.kick_hidden has no effect with model.head = poin",
-        ),
-        (
-            ["model.features=relative", "model.parameter_hidden=[8]"],
-            "model.parameter_hidden has no effect with model.head = point",
-        ),
-        (
-            ["model.features=relative", "model.kick_dropout=0.1"],
-            "model.kick_dropout has no effect with model.head = point",
-        ),
-        (
-            ["model.features=relative", "model.head=mixture"],
-            "model.head = mixture needs model.parameter_hidden; model.head = mixture needs model.kick_hidden",
-        ),
-        (
-            ["model.features=relative", *MIXTURE, "model.kick_attention=6"],
-            "model.kick_attention: expected a multiple of 4, got 6",
-        ),
-        (["model.features=relative", *MIXTURE, "train.aim_weight=1"], "train.aim_weight has no effect with model.aims"),
-        (
-            ["model.features=relative", *MIXTURE, "train.parameter_loss=masked"],
-            "train.parameter_loss has no effect with model.head = mixture",
-        ),
+        ("model.own_type=true", "no setting 'model.own_type'; it is of the family paper, this is egocentric"),
+        ("model.parameter_loss=masked", "it is of the family paper or egocentric-point, this is egocentric"),
+        ("model.parameter_hidden=[0]", "model.parameter_hidden: expected at least 1, got 0"),
+        ("model.parameter_hidden=[]", "model.parameter_hidden: expected at least one value, got none"),
+        ("model.kick_hidden=[]", "model.kick_hidden: expected at least one value, got none"),
+        ("model.kick_dropout=1", "model.kick_dropout: expected at most 0.9, got 1"),
+        ("model.kick_attention=6", "model.kick_attention: expected a multiple of 4, got 6"),
+        ("model.target_weight=-1", "model.target_weight: expected at least 0, got -1"),
+        ("model.blocks=self,bal", "model.blocks: no 'bal'; did you mean ball?"),
     ],
 )
-def test_useless_and_lacking_combinations_are_refused(settings: list[str], answer: str) -> None:
+def test_mistakes_of_the_egocentric_family_are_named(text: str, answer: str) -> None:
     with pytest.raises(UsageError) as error:
-        load_config("paper", settings)
+        load_config("best", [text])
     assert answer in str(error.value)
 
 
 @pytest.mark.parametrize(
-    "settings",
+    ("preset", "settings", "answer"),
     [
-        [],
-        ["model.blocks=self"],
-        ["model.aims=2", "model.aim_hidden=[8]"],
-        ["train.parameter_loss=masked"],
-        MIXTURE,
-        [*MIXTURE, "model.kick_blocks=self,ball", "model.aims=1", "model.aim_hidden=8"],
-        [*MIXTURE, "model.kick_dropout=0.5", "model.aims=1", "model.aim_hidden=8", "train.aim_weight=0.1"],
+        (
+            "paper",
+            ["train.optimiser=adagrad", "train.weight_decay=0.1"],
+            "weight_decay has no effect with train.opt",
+        ),
+        ("paper", ["train.balance_strength=0.5"], "train.balance_strength has no effect with train.balance = none"),
+        ("best", ["model.target_points=0", "model.target_weight=1"], "target_weight has no effect with model.target_p"),
+        ("best", ["model.target_points=0", "model.target_hidden=8"], "target_hidden has no effect with model.target_p"),
     ],
 )
-def test_combinations_that_go_together(settings: list[str]) -> None:
-    assert load_config("paper", ["model.features=relative", *settings]).model.features == "relative"
+def test_settings_that_would_have_no_effect_are_refused(preset: str, settings: list[str], answer: str) -> None:
+    with pytest.raises(UsageError) as error:
+        load_config(preset, settings)
+    assert answer in str(error.value)
+
+
+def test_another_family_keeps_what_both_have_and_has_its_own_defaults() -> None:
+    model = load_config("paper", ["model.family=egocentric", "model.hidden=[8]", "model.kick_dropout=0.5"]).model
+    assert model == EgocentricConfig(hidden=(8,), kick_dropout=0.5)
+    config = load_config("best", ["model.blocks=self,ball", "model.target_points=2"])
+    other = override(config, ["model.family=egocentric-point"])
+    assert other.model == EgocentricPointConfig(blocks=("self", "ball"), target_points=2)
+    assert "model.kick_dropout: 0.3 became nothing" in differences(config, other)
+    assert "model.parameter_loss: nothing became masked" in differences(config, other)
 
 
 def test_unknown_presets_and_sections() -> None:

@@ -32,7 +32,7 @@ def learn(model: Clone, stepper: Muon) -> None:
 
 @pytest.mark.parametrize("members", [1, 2])
 def test_muon_has_the_matrices_of_the_hidden_layers_and_adam_all_else(members: int) -> None:
-    model, stepper = clone(f"model.members={members}")
+    model, stepper = clone(f"model.ensemble_size={members}")
     muon, adam = ({id(of) for group in part.param_groups for of in group["params"]} for part in stepper.parts)
     for name, weights in model.named_parameters():
         hidden = name.startswith("trunk.") and name.endswith(".weight")

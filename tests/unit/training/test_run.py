@@ -61,7 +61,7 @@ def test_missing_foreign_or_other_format(tmp_path: Path, dataset: Dataset, confi
     run = create_run(tmp_path / "run", config, dataset, device="cpu", precision="fp32")
     environment = run.path / "environment.json"
     environment.write_text(json.dumps(run.environment | {"format": 7}))
-    with pytest.raises(RunError, match="run of format 7, this version reads 3"):
+    with pytest.raises(RunError, match="run of format 7, this version reads 4"):
         open_run(run.path)
     for text in ("{", "[]", "{}"):
         environment.write_text(text)

@@ -13,7 +13,7 @@ from teamclone.models.answer import Answer, Prediction
 from teamclone.models.heads.mixture import Kick, MixtureHead
 from teamclone.models.heads.point import PointHead
 from teamclone.models.heads.trunk_output import KickFeatures
-from teamclone.models.loss import Loss
+from teamclone.models.loss import Balance, Loss
 from teamclone.world.state import Target
 
 
@@ -85,13 +85,15 @@ class EnsembleHead(nn.Module):
         """Return the mean of the members' errors, see `MixtureHead.kick_loss`."""
         return torch.stack([self._first.kick_loss(answers, target, of=of) for answers in kicks]).mean()
 
-    def loss(self, answer: EnsembleAnswer, target: Target, **settings: Any) -> Loss:
+    def loss(
+        self, answer: EnsembleAnswer, target: Target, *, balance: Balance | None = None, whole: Tensor | None = None
+    ) -> Loss:
         """Return in training the mean of the members' errors, so that each learns as if alone; else that of ``answer``.
 
-        ``settings`` are those of the members' ``loss``.
+        ``balance`` and ``whole`` are as in `loss.point_loss`.
         """
         if not self.training:
-            loss: Loss = self._first.loss(answer.merged, target, **settings)
+            loss: Loss = self._first.loss(answer.merged, target, balance=balance, whole=whole)
             return loss
-        losses = [self._first.loss(member, target, **settings) for member in answer.members]
+        losses = [self._first.loss(member, target, balance=balance, whole=whole) for member in answer.members]
         return Loss(*(torch.stack(part).mean() for part in zip(*losses, strict=True)))

@@ -26,7 +26,7 @@ from teamclone.models.distributions import (
 from teamclone.models.heads.kick import Kicks
 from teamclone.models.heads.trunk_output import KickFeatures, TrunkOutput
 from teamclone.models.inputs.geometry import geometry_of, tackle_of
-from teamclone.models.loss import Balance, Loss, ParameterLoss, mixture_loss
+from teamclone.models.loss import Balance, Loss, mixture_loss
 from teamclone.planner import tackle as tackling
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CLONED
@@ -52,8 +52,8 @@ MOVE_REACH_M = 10.0
 """How far from there one goes for an output of 1."""
 WITH_BALL = CLONED.index("kick"), CLONED.index("tackle")
 """Classes whose parameters the layers of a kick find."""
-AIM_SCALE_DEG = 4.0
-"""Scale of the bell by which a turn teaches the aims that are near its direction."""
+TARGET_SCALE_DEG = 4.0
+"""Scale of the logistic density by which a turn teaches the target points near its direction."""
 
 
 class Kick(NamedTuple):
@@ -78,7 +78,7 @@ class ActionDistribution(NamedTuple):
         logits: (batch, commands).
         dash_power: power. dash_direction: (batch, DASH_DIRECTIONS) logits. turn: radians before the loss by motion.
         turn_factor: (batch,) turn moment for one degree.
-        aim: the turn again, by the aims alone: only they are to learn from it.
+        turn_to_targets: the turn, by the target points alone: only they learn from it.
         kick: several answers of which the mean counts.
         kicks: (kicks,) of which situations they are; None for all.
         catch: (batch, CATCH_DIRECTIONS) logits. move: a place. None where this is no command of the model.
@@ -89,7 +89,7 @@ class ActionDistribution(NamedTuple):
     dash_direction: Tensor
     turn: Mixture
     turn_factor: Tensor
-    aim: Mixture
+    turn_to_targets: Mixture
     kick: tuple[Kick, ...]
     kicks: Tensor | None
     catch: Tensor | None
@@ -181,8 +181,10 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are, target_width: of what is known of each target. planned: see `heads.kick.Kicks`. aims: places of
-            `layers.targets.TargetPoints`. commands: what it answers with.
+            kicks are, target_width: of what is known of each player or goal to kick to. planned: see
+            `heads.kick.Kicks`. target_points: of `layers.targets.TargetPoints`. commands: the command set.
+        parameter_weight: of the parameters' error beside that of the command. target_weight: of the error by which
+            turns teach the target points.
 
     Attributes:
         temperature: as of `PointHead`; of the commands only.
@@ -199,11 +201,15 @@ class MixtureHead(nn.Module):
         kick_width: int,
         target_width: int,
         planned: bool,
-        aims: int,
+        target_points: int,
         commands: tuple[str, ...] = CLONED,
+        parameter_weight: float = 1.0,
+        target_weight: float = 0.0,
     ) -> None:
         super().__init__()
-        self.n_dash, self.n_turn = aims + INCOMES + FREE_COMPONENTS, aims + 2 + FREE_COMPONENTS
+        self.parameter_weight, self.target_weight = parameter_weight, target_weight
+        self.n_dash = target_points + INCOMES + FREE_COMPONENTS
+        self.n_turn = target_points + 2 + FREE_COMPONENTS
         self.command = nn.Linear(width, len(commands))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
@@ -226,14 +232,14 @@ class MixtureHead(nn.Module):
         dash, turn = (layer(situation.parameters).float() for layer in (self.dash, self.turn))
         kick = self.kicks(situation.at_ball)
         with torch.autocast(command.device.type, enabled=False):
-            turned, aim = self._turn(turn, situation)
+            turned, to_targets = self._turn(turn, situation)
             distribution = ActionDistribution(
                 logits=command,
                 dash_power=self._dash(dash[:, : 3 * self.n_dash], situation),
                 dash_direction=dash[:, 3 * self.n_dash :],
                 turn=turned,
                 turn_factor=geometry_of(situation.geometry, "turn_factor")[0][:, 0],
-                aim=aim,
+                turn_to_targets=to_targets,
                 kick=kick,
                 kicks=situation.kicks,
                 catch=self._catch(situation),
@@ -251,7 +257,7 @@ class MixtureHead(nn.Module):
         )
 
     def _turn(self, raw: Tensor, situation: TrunkOutput) -> tuple[Mixture, Mixture]:
-        """The turn, and by the aims alone."""
+        """Return the turn, and the turn by the target points alone."""
         logits, shift, scale = raw.chunk(3, 1)
         to_ball, to_meet = geometry_of(situation.geometry, "turn_to_ball", "turn_to_meet")
         free = torch.linspace(-0.75, 0.75, FREE_COMPONENTS, device=raw.device).expand(raw.shape[0], -1) * torch.pi
@@ -263,11 +269,11 @@ class MixtureHead(nn.Module):
             wrap(centre.detach() + reach * shift),
             mixture.scale_of(scale, least=LEAST_ANGLE, typical=2 * DEGREE),
         )
-        width = torch.full_like(centre, AIM_SCALE_DEG * DEGREE)
+        width = torch.full_like(centre, TARGET_SCALE_DEG * DEGREE)
         return turn, Mixture(logits.detach(), wrap(centre), width)
 
     def _catch(self, situation: TrunkOutput) -> Tensor | None:
-        """Goalkeepers aim such that the ball lies at an edge of the catch area, not in its middle."""
+        """Return the direction: a catch has the ball at an edge of the catch area, not in its middle."""
         if self.catch is None:
             return None
         names = ("x", "y", "cos", "sin", "ball_x", "ball_y")
@@ -316,7 +322,7 @@ class MixtureHead(nn.Module):
                 dash_direction=mean_logits([one.dash_direction for one in of]),
                 turn=mixture.merged([one.turn for one in of]),
                 turn_factor=of[0].turn_factor,
-                aim=mixture.merged([one.aim for one in of]),
+                turn_to_targets=mixture.merged([one.turn_to_targets for one in of]),
                 kick=tuple(kick for one in of for kick in one.kick),
                 kicks=of[0].kicks,
                 catch=mean_logits(catches) if catches else None,
@@ -330,28 +336,26 @@ class MixtureHead(nn.Module):
         answer: MixtureAnswer,
         target: Target,
         *,
-        parameter_loss: ParameterLoss = "paper",
-        weight: float = 1.0,
-        aim_weight: float = 0.0,
         balance: Balance | None = None,
         whole: Tensor | None = None,
     ) -> Loss:
-        """Return the negative log-likelihood of command and parameters; ``parameter_loss`` has no effect.
+        """Return the negative log-likelihood of command and parameters; arguments as in `loss.point_loss`.
 
         In training the kick as it is and its mirror image count each by itself, so that each learns as if alone.
         """
         of = answer.distribution
         answers = of.kick if self.training else (_mean_kick(of.kick),)
-        aims = mixture.log_likelihood(
-            of.aim.logits, mixture.angle_terms(of.aim, target.parameters[:, 0], factor=of.turn_factor)
+        to_targets = mixture.log_likelihood(
+            of.turn_to_targets.logits,
+            mixture.angle_terms(of.turn_to_targets, target.parameters[:, 0], factor=of.turn_factor),
         )
         return mixture_loss(
             of.logits,
             _chosen(of, target, answers),
             target,
-            aims=torch.where(target.kind == CLONED.index("turn"), aims, 0.0),
-            weight=weight,
-            aim_weight=aim_weight,
+            to_targets=torch.where(target.kind == CLONED.index("turn"), to_targets, 0.0),
+            weight=self.parameter_weight,
+            target_weight=self.target_weight,
             balance=balance,
             whole=whole,
         )

@@ -67,6 +67,9 @@ class PointAnswer(Answer):
 class PointHead(nn.Module):
     """The paper's two heads: a softmax over the commands, by default four, their parameters, then six, bounded by tanh.
 
+    Args:
+        width: of the features. commands: the command set. parameter_loss, parameter_weight: see `point_loss`.
+
     Attributes:
         temperature: () what the logits are divided by in an answer, not in training; see `training.calibration`.
     """
@@ -74,9 +77,16 @@ class PointHead(nn.Module):
     limits: Tensor
     temperature: Tensor
 
-    def __init__(self, width: int, commands: tuple[str, ...] = CLONED) -> None:
+    def __init__(
+        self,
+        width: int,
+        commands: tuple[str, ...] = CLONED,
+        *,
+        parameter_loss: ParameterLoss = "paper",
+        parameter_weight: float = 1.0,
+    ) -> None:
         super().__init__()
-        self.commands = commands
+        self.commands, self.parameter_loss, self.parameter_weight = commands, parameter_loss, parameter_weight
         self.command = nn.Linear(width, len(commands))
         self.parameter = nn.Linear(width, len(parameters_of(commands)))
         self.register_buffer("limits", parameter_layout(torch.device("cpu"), commands)[0].clone(), persistent=False)
@@ -107,20 +117,17 @@ class PointHead(nn.Module):
         answer: PointAnswer,
         target: Target,
         *,
-        parameter_loss: ParameterLoss = "paper",
-        weight: float = 1.0,
-        aim_weight: float = 0.0,
         balance: Balance | None = None,
         whole: Tensor | None = None,
     ) -> Loss:
-        """Return the error of the paper, see `point_loss`; ``aim_weight`` has no effect."""
+        """Return the error of the paper, see `point_loss`."""
         return point_loss(
             answer.raw_logits,
             answer.projected,
             target,
             commands=self.commands,
-            parameter_loss=parameter_loss,
-            weight=weight,
+            parameter_loss=self.parameter_loss,
+            weight=self.parameter_weight,
             balance=balance,
             whole=whole,
         )

@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.utils._pytree import tree_map
 
 from teamclone.models.clone import Clone
-from teamclone.models.config import ModelConfig
+from teamclone.models.config import EgocentricConfig, ModelConfig, PaperConfig
 from teamclone.models.heads.ensemble import EnsembleAnswer
 from teamclone.models.heads.mixture import CATCH_DIRECTIONS, CATCH_EDGE_DEG, MixtureAnswer, MixtureHead
 from teamclone.rcss.commands import CLONED, PARAMETERS, REPERTOIRE, parameters_of
@@ -21,18 +21,19 @@ from teamclone.rcss.pitch import MAX_X, MAX_Y
 from teamclone.world.channels import CHANNEL
 from teamclone.world.state import State, Target
 
-PAPER = ModelConfig(hidden=(16,), commands=REPERTOIRE)
-MIXTURE = ModelConfig(
-    features="relative",
+PAPER = PaperConfig(hidden=(16,), commands=REPERTOIRE, parameter_loss="masked")
+MIXTURE = EgocentricConfig(
     blocks=("self", "role", "ball", "mode"),
     kick_blocks=("ball", "mates"),
-    aims=2,
-    aim_hidden=(16,),
+    target_points=2,
+    target_hidden=(16,),
     parameter_hidden=(64,),
     kick_hidden=(32,),
     hidden=(64, 32),
-    head="mixture",
     commands=REPERTOIRE,
+    kick_attention=0,
+    kick_dropout=0.0,
+    target_weight=0.0,
 )
 CATCH, MOVE, NONE = (REPERTOIRE.index(name) for name in ("catch", "move", "none"))
 
@@ -55,7 +56,7 @@ def test_parameters_of_commands() -> None:
     assert [item.name for item in parameters_of((*CLONED, "move", "none"))][6:] == ["move_x", "move_y"]
 
 
-@pytest.mark.parametrize("config", [PAPER, MIXTURE, replace(PAPER, members=3), replace(MIXTURE, members=2)])
+@pytest.mark.parametrize("config", [PAPER, MIXTURE, replace(PAPER, ensemble_size=3), replace(MIXTURE, ensemble_size=2)])
 @pytest.mark.parametrize("further", [("catch",), ("move",), ("none",), ("catch", "move", "none")])
 def test_answers_of_any_commands(config: ModelConfig, further: tuple[str, ...]) -> None:
     state = situations(9)
@@ -89,7 +90,7 @@ def likelihoods(model: Clone, kind: int, first: Tensor, second: Tensor) -> Tenso
 
 @pytest.mark.parametrize("members", [1, 2])
 def test_catch_directions_make_up_one(members: int) -> None:
-    model = fitted(replace(MIXTURE, members=members), situations(50))
+    model = fitted(replace(MIXTURE, ensemble_size=members), situations(50))
     degrees = torch.arange(-179.75, 180, 0.5)  # none between two classes
     with torch.no_grad():
         output = model.answer(situations(1, seed=3))
@@ -136,7 +137,7 @@ def test_further_commands_are_learned(config: ModelConfig) -> None:
     inputs, target = model.features(state), target_of(state)
     optimiser = torch.optim.Adam(model.parameters(), lr=3e-3)
     for _ in range(120):
-        loss = model.loss(model.answer_inputs(inputs), target, parameter_loss="masked")
+        loss = model.loss(model.answer_inputs(inputs), target)
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -7,19 +9,21 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.models.clone import Clone, parameter_count
-from teamclone.models.config import ModelConfig
+from teamclone.models.config import EgocentricConfig, ModelConfig, PaperConfig
 
-PAPER = ModelConfig(hidden=(16, 8))
-MIXTURE = ModelConfig(
-    features="relative",
+PAPER = PaperConfig(hidden=(16, 8), parameter_weight=0.5)
+MIXTURE = EgocentricConfig(
     blocks=("self", "ball"),
     kick_blocks=("ball", "mates"),
-    aims=2,
-    aim_hidden=(8,),
+    target_points=2,
+    target_hidden=(8,),
     parameter_hidden=(8,),
     kick_hidden=(8,),
     hidden=(16, 8),
-    head="mixture",
+    kick_attention=0,
+    kick_dropout=0.0,
+    target_weight=0.0,
+    parameter_weight=0.5,
 )
 CONFIGS = pytest.mark.parametrize("config", [PAPER, MIXTURE])
 
@@ -31,9 +35,8 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 
 def ensemble(config: ModelConfig, members: int) -> tuple[Clone, list[Clone]]:
     """An ensemble, and each of its members as a clone of its own."""
-    settings = {name: getattr(config, name) for name in config.__slots__}
     torch.manual_seed(0)
-    together = Clone(ModelConfig(**settings | {"members": members}))
+    together = Clone(replace(config, ensemble_size=members))
     alone = []
     for index in range(members):
         model = Clone(config)
@@ -86,11 +89,11 @@ def test_each_member_learns_as_if_alone(dataset: Dataset, config: ModelConfig) -
     together, alone = ensemble(config, 2)
     rows = np.arange(64)
     state, target = dataset.state(rows), dataset.target(rows)
-    loss = together.train().loss(together.answer(state), target, weight=0.5)
+    loss = together.train().loss(together.answer(state), target)
     loss.total.backward()
     totals = []
     for index, model in enumerate(alone):
-        single = model.train().loss(model.answer(state), target, weight=0.5)
+        single = model.train().loss(model.answer(state), target)
         single.total.backward()
         totals.append(single.total.item())
         mine = (*together.trunk.members[index].parameters(), *together.head.members[index].parameters())

@@ -11,7 +11,7 @@ import torch
 from tests.situations import situations
 
 from teamclone.models.clone import Clone
-from teamclone.models.config import ModelConfig
+from teamclone.models.config import EgocentricConfig
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
 from teamclone.models.heads.kick import (
     AHEAD_M,
@@ -152,17 +152,17 @@ def test_scales_are_typical() -> None:
 
 # Left and right.
 
-MODEL = ModelConfig(
-    features="relative",
+MODEL = EgocentricConfig(
     blocks=("self", "role", "ball"),
     kick_blocks=("self", "type", "last", "ball", "reach", "lines", "mates", "opponents", "rivals"),
-    aims=2,
-    aim_hidden=(8,),
+    target_points=2,
+    target_hidden=(8,),
     parameter_hidden=(8,),
     kick_hidden=(32,),
     kick_dropout=0.3,
     hidden=(16,),
-    head="mixture",
+    kick_attention=0,
+    target_weight=0.0,
 )
 
 

@@ -21,17 +21,17 @@ def geometry(batch: int = 1, **values: float) -> Tensor:
 
 def at(*places: tuple[float, float]) -> TargetPoints:
     """TargetPoints that suppose these places whatever they are given."""
-    aims = TargetPoints(3, len(places), (), nn.ReLU)
+    targets = TargetPoints(3, len(places), (), nn.ReLU)
     with torch.no_grad():
-        aims.place.weight.zero_()
-        aims.place.bias.copy_((torch.tensor(places) / torch.tensor(SCALE)).flatten())
-    return aims
+        targets.place.weight.zero_()
+        targets.place.bias.copy_((torch.tensor(places) / torch.tensor(SCALE)).flatten())
+    return targets
 
 
-def look(aims: TargetPoints, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def look(targets: TargetPoints, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     with torch.no_grad():
-        columns, bearing, power = aims(torch.randn(len(seen), 3), seen)
-    return columns.view(len(seen), aims.count, TARGET_COLUMNS), bearing, power
+        columns, bearing, power = targets(torch.randn(len(seen), 3), seen)
+    return columns.view(len(seen), targets.count, TARGET_COLUMNS), bearing, power
 
 
 def test_layers() -> None:
@@ -99,22 +99,22 @@ def test_the_first_half_stays_behind_the_offside_line() -> None:
 
 
 def test_a_place_where_he_stands_is_a_number() -> None:
-    aims = at((0, 0), (0, 0))
-    columns, bearing, power = aims(torch.randn(1, 3), geometry())
+    targets = at((0, 0), (0, 0))
+    columns, bearing, power = targets(torch.randn(1, 3), geometry())
     (columns.sum() + bearing.sum() + power.sum()).backward()
     assert columns.isfinite().all()
-    assert aims.place.bias.grad is not None
-    assert aims.place.bias.grad.isfinite().all()
+    assert targets.place.bias.grad is not None
+    assert targets.place.bias.grad.isfinite().all()
 
 
 def test_places_follow_from_what_is_seen_and_are_learned() -> None:
     torch.manual_seed(0)
-    aims = TargetPoints(3, 2, (16,), nn.ReLU)
+    targets = TargetPoints(3, 2, (16,), nn.ReLU)
     rows = torch.randn(64, 3)
     wanted = torch.stack([10 * rows[:, 0], 10 * rows[:, 1]], 1)
-    optimiser = torch.optim.Adam(aims.parameters(), lr=0.02)
+    optimiser = torch.optim.Adam(targets.parameters(), lr=0.02)
     for _ in range(100):
-        columns = aims(rows, geometry(64, line_x=100.0))[0].view(64, 2, TARGET_COLUMNS)
+        columns = targets(rows, geometry(64, line_x=100.0))[0].view(64, 2, TARGET_COLUMNS)
         loss = (20 * columns[:, 0, :2] - wanted).square().mean()
         optimiser.zero_grad()
         loss.backward()
@@ -123,15 +123,15 @@ def test_places_follow_from_what_is_seen_and_are_learned() -> None:
 
 
 def test_no_places() -> None:
-    aims = TargetPoints(3, 0, (), nn.ReLU)
-    outputs = aims(torch.randn(5, 3), geometry(5))
+    targets = TargetPoints(3, 0, (), nn.ReLU)
+    outputs = targets(torch.randn(5, 3), geometry(5))
     assert [tuple(output.shape) for output in outputs] == [(5, 0)] * 3
-    assert list(aims.parameters()) == []
+    assert list(targets.parameters()) == []
 
 
 def test_places_are_in_single_precision_under_autocast() -> None:
-    aims = at((10.1, 0))
+    targets = at((10.1, 0))
     with torch.autocast("cpu", dtype=torch.bfloat16):
-        columns, bearing, power = look(aims, geometry())
+        columns, bearing, power = look(targets, geometry())
     assert {columns.dtype, bearing.dtype, power.dtype} == {torch.float32}
     assert float(columns[0, 0, 0]) * 20 == pytest.approx(10.1, abs=1e-4)

@@ -41,11 +41,12 @@ class DatasetWriter:
 
     @property
     def n_frames(self) -> int:
-        """How many frames were added."""
+        """Number of frames added so far."""
         return self._files["frames", "match"].rows
 
     @property
     def n_samples(self) -> int:
+        """Number of samples added so far."""
         return self._files["samples", "frame"].rows
 
     def add(self, *, frames: Mapping[str, NDArray[Any]], samples: Mapping[str, NDArray[Any]]) -> None:

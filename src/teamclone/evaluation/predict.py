@@ -76,7 +76,7 @@ def predict(
 def truth(
     dataset: Dataset, rows: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64]]:
-    """kind (n,), issued (n, parameters) and last (n,) as in `Predictions`, of some samples."""
+    """Return kind (n,), issued (n, parameters) and last (n,), see `Predictions`, of samples ``rows`` (n,)."""
     target = dataset.target(rows)
     kind, arguments = target.kind.numpy(), target.parameters.numpy()
     items = parameters_of(dataset.commands)

@@ -120,10 +120,12 @@ class Match:
 
     @property
     def left(self) -> Team:
+        """The left team, see ``GameLog.left``."""
         return self.game.left
 
     @property
     def right(self) -> Team:
+        """The right team, see ``GameLog.right``."""
         return self.game.right
 
     @property
@@ -148,6 +150,7 @@ class Match:
 
     @property
     def event_texts(self) -> tuple[str, ...]:
+        """The words of the events, (n_events,); empty without a command log."""
         return self.log.event_texts if self.log is not None else ()
 
     def command_text(self, index: int) -> str:

@@ -153,6 +153,7 @@ def _pieces(buffer: NDArray[np.uint8]) -> Iterator[tuple[int, NDArray[np.uint8]]
 
 
 def count_byte(buffer: NDArray[np.uint8], byte: int) -> int:
+    """Return how often a byte occurs."""
     return sum(int(np.count_nonzero(piece == byte)) for _, piece in _pieces(buffer))
 
 

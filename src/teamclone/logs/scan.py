@@ -166,8 +166,10 @@ def _number(buffer: Bytes, start: int, stop: int) -> tuple[float, int]:
 
 @_helper
 def _whole_number(buffer: Bytes, start: int, stop: int) -> tuple[int, int]:
-    """The number at ``start`` without its decimals and the position behind it; -1 for the position where there is
-    none that an int32 holds."""
+    """Return the number at ``start`` without its decimals, and the position behind it.
+
+    The position is -1 where there is no number that an int32 holds.
+    """
     if start < stop and start + 8 < len(buffer):
         digits = _word(buffer, start) ^ (np.uint64(48) * _EVERY)
         length = _first((((digits & _LOW_BITS) + np.uint64(0x76) * _EVERY) | digits) & _HIGH_BITS)

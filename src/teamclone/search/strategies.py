@@ -68,6 +68,7 @@ class Beam:
             raise UsageError("; ".join(problems))
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return the first architectures, then, whenever all trials have ended, the untried neighbours of the beam."""
         if not trials:
             widths = [1 << bits for bits in range(self.config.largest.bit_length())]
             first = self.config.start or [(width,) for width in widths if width >= self.config.smallest]
@@ -87,6 +88,7 @@ class Beam:
         return [self._trial(hidden, step=step, parent=parent) for hidden, parent in found.items()]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
+        """Return False: every trial is trained to its end."""
         return False
 
     def beams(self, trials: Sequence[Trial]) -> list[list[Trial]]:
@@ -139,6 +141,7 @@ class Study:
             raise UsageError("--set holds every setting that the study varies; leave one of them out")
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return one trial with settings that Optuna chose; none once there are ``config.trials`` of them."""
         if len(trials) >= self.config.trials:
             return []
         base, chosen = self.config.base, self._study(trials).ask(self.space()).params
@@ -153,6 +156,7 @@ class Study:
         return [Trial(name=f"{len(trials):04d}", settings=settings)]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
+        """Return whether Optuna's median pruner would give the trial up."""
         study = self._study(trials)
         return bool(study.pruner.prune(study, self._frozen(trial)))
 
@@ -221,6 +225,7 @@ class Optimisers:
             raise UsageError(f"the comparison of optimisers chooses {' and '.join(chosen)}; leave --set of it out")
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return every pair of `OPTIMISERS` and `RATES` at first; none afterwards."""
         if trials:
             return []
         usual = TrainConfig()
@@ -237,6 +242,7 @@ class Optimisers:
         ]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
+        """Return False: every trial is trained to its end."""
         return False
 
 

@@ -24,6 +24,8 @@ FORMAT = 1
 
 
 class Mode(StrEnum):
+    """How a search chooses its trials; each value has a strategy in `search.strategies`."""
+
     BEAM = "beam"
     STUDY = "study"
     OPTIMISERS = "optimisers"
@@ -47,6 +49,8 @@ class Objective(StrEnum):
 
 
 class Status(StrEnum):
+    """How far a trial is; ``pruned``: given up after an epoch that promised too little."""
+
     WAITING = "waiting"
     RUNNING = "running"
     FINISHED = "finished"

@@ -31,6 +31,8 @@ from teamclone.training.run import is_run, open_run, save_config
 
 
 class Task(NamedTuple):
+    """A trial to train: its settings and the folder of its run, which may hold an earlier attempt to resume."""
+
     config: Config
     folder: Path
 
@@ -43,6 +45,8 @@ class Epoch(NamedTuple):
 
 
 class Ended(NamedTuple):
+    """The end of a trial; ``error`` is None unless it failed."""
+
     status: Status
     error: str | None
 
@@ -64,6 +68,7 @@ class Worker:
         theirs.close()
 
     def give(self, trial: Trial, config: Config, folder: Path) -> None:
+        """Send a trial to the process, which is started anew if it died; `take` then returns its messages."""
         if not self.process.is_alive():
             self.stop()
             self._start()
@@ -85,6 +90,7 @@ class Worker:
         return trial, message
 
     def answer(self, *, prune: bool) -> None:
+        """Reply to an `Epoch`: whether to give the trial up."""
         with suppress(OSError):  # a process that has just died is noticed by `take`
             self.connection.send(prune)
 

@@ -44,6 +44,7 @@ class IngestReport:
         return sum(status.outcome is outcome for status in self.files)
 
     def to_json(self) -> dict[str, Any]:
+        """Return the counts, the seconds and the status of each file, as ``teamclone ingest --json`` prints them."""
         return {
             "matches": {"added": self.added, "replaced": self.replaced, "unchanged": self.unchanged},
             "files": {str(outcome): self.count(outcome) for outcome in FileOutcome},

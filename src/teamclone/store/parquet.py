@@ -60,12 +60,18 @@ class ParquetStore(Store):
 
     @property
     def location(self) -> str:
+        """The store's folder, absolute."""
         return str(self.root)
 
     # -- opening ---------------------------------------------------------------------------------------------------
 
     @classmethod
     def open(cls, root: Path) -> ParquetStore:
+        """Open the store in a folder.
+
+        Raises:
+            StoreError: there is none, it is not teamclone's, or its format is another one.
+        """
         marker = root / MARKER
         try:
             found = json.loads(marker.read_bytes())
@@ -83,6 +89,11 @@ class ParquetStore(Store):
 
     @classmethod
     def create(cls, root: Path) -> ParquetStore:
+        """Make a store in a new or empty folder, or open the one that is there.
+
+        Raises:
+            StoreError: the folder holds other things, is a file, or cannot be written.
+        """
         if (root / MARKER).exists():
             return cls.open(root)
         if root.exists() and not root.is_dir():
@@ -102,12 +113,15 @@ class ParquetStore(Store):
     # -- reading ---------------------------------------------------------------------------------------------------
 
     def match_ids(self) -> list[str]:
+        """Return the ids of the matches, sorted."""
         return sorted(entry.name for entry in os.scandir(self._matches) if entry.is_dir())
 
     def matches(self) -> pa.Table:
+        """Return the table ``matches``, by start, file name and id."""
         return self.sql("select * from matches order by started_at nulls last, game_log, match_id")
 
     def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read a match's rows of one table from its Parquet file; see `Store.read_table`."""
         wanted = schema.table(table)
         names = [field.name for field in wanted.select(columns)]
         path = self._matches / match_id / f"{table}.parquet"
@@ -121,6 +135,7 @@ class ParquetStore(Store):
             raise StoreError(f"{path}: cannot be read ({first_line(error)}); {_remedy(path)}") from error
 
     def stream(self, query: str) -> QueryRows:
+        """Answer a query with DuckDB; see `Store.stream`."""
         connection = self._connect()
         try:
             statements = duckdb.extract_statements(query)
@@ -157,6 +172,7 @@ class ParquetStore(Store):
     # -- writing ---------------------------------------------------------------------------------------------------
 
     def add(self, match: Match) -> Added:
+        """Write a match to a folder of its own, then move it among the matches in one step; see `Store.add`."""
         sources = convert.sources_of(match)
         home = self._matches / match.match_id
         known = self._sources(match.match_id)
@@ -183,6 +199,7 @@ class ParquetStore(Store):
         return Added.ADDED if known is None else Added.REPLACED
 
     def remove(self, match_id: str) -> None:
+        """Delete a match's folder; nothing happens where there is none."""
         # Away in one step, so that no reader finds half a match; the name is new, the folder may be left over.
         grave = self._unfinished / f"{match_id}-{uuid.uuid4().hex}"
         with suppress(FileNotFoundError):
@@ -197,6 +214,7 @@ class ParquetStore(Store):
             return None
 
     def files(self) -> list[FileStatus]:
+        """Return the status of every source file, by path; rows that cannot be read are left out."""
         found = []
         for path in self._files.glob("*.json"):
             # A row that cannot be read only costs reading its file again.
@@ -205,12 +223,14 @@ class ParquetStore(Store):
         return sorted(found, key=lambda status: status.path)
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
+        """Write one JSON document for each status."""
         with _writing(self.root):
             for status in statuses:
                 write_document(self._files / f"{status.key}.json", status.to_json())
 
     @contextmanager
     def writing(self) -> Iterator[None]:
+        """Hold the store's lock while an ingest writes; see `Store.writing`."""
         with _writing(self.root):
             lock = self.root / ".lock"
             lock.touch()

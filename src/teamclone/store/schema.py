@@ -57,6 +57,7 @@ class Field:
 
     @property
     def sql_type(self) -> str:
+        """The column's type in DuckDB's SQL."""
         return SQL_NAMES[self.dtype]
 
 
@@ -79,6 +80,7 @@ class Table:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The names of the columns, in their order."""
         return tuple(field.name for field in self.fields)
 
     def select(self, names: Sequence[str] | None) -> tuple[Field, ...]:

@@ -27,6 +27,7 @@ class SharedStore:
 
     @classmethod
     def of(cls, store: Store) -> Self:
+        """Describe an open store so that another process can open it."""
         return cls(location=store.location, marker=_marker(store.location))
 
     def open(self) -> Store:

@@ -44,6 +44,7 @@ class FileStatus:
 
     @property
     def key(self) -> str:
+        """The name of this row in a store: `key_of` its path."""
         return key_of(Path(self.path))
 
     def describes(self, path: Path) -> bool:
@@ -51,10 +52,16 @@ class FileStatus:
         return (self.size, self.mtime_ns) == stamp(path)
 
     def to_json(self) -> dict[str, Any]:
+        """Return the fields by name; `from_json` is the inverse."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
+        """Make a status from the fields that `to_json` returned.
+
+        Raises:
+            ValueError, KeyError, TypeError: the values are not those of a status.
+        """
         return cls(**{**values, "outcome": FileOutcome(values["outcome"])})
 
 

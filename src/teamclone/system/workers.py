@@ -131,6 +131,7 @@ class Processes(Executor):
         self._pools: list[ProcessPoolExecutor] = []
 
     def submit(self, function: Callable[..., R], /, *args: Any, **options: Any) -> Future[R]:
+        """Run a call in a process; the future raises `BrokenExecutor` if two processes died of it."""
         return self._threads.submit(self._call, function, *args, **options)
 
     def _call(self, function: Callable[..., R], *args: Any, **options: Any) -> R:
@@ -155,6 +156,7 @@ class Processes(Executor):
         return pool
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes; ``wait`` and ``cancel_futures`` as in `concurrent.futures.Executor.shutdown`."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         for pool in self._pools:
             pool.shutdown(wait)

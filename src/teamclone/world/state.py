@@ -120,8 +120,12 @@ class State(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What the players did: kind (batch,) int64 index into the dataset's commands; parameters (batch, 2) in power,
-    degrees and metres."""
+    """The commands of the players who act.
+
+    Attributes:
+        kind: (batch,) int64 index into the dataset's commands.
+        parameters: (batch, 2) power, degrees and metres.
+    """
 
     kind: Tensor
     parameters: Tensor

@@ -1,4 +1,4 @@
-"""The URL of a store in PostgreSQL: what it names, and what messages must not show of it."""
+"""The URL of a store in PostgreSQL: its parts, and the form for messages, without passwords."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def masked(location: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Location:
-    """What a URL ``postgresql://user:password@host:port/database?schema=...`` means.
+    """A URL ``postgresql://user:password@host:port/database?schema=...``, taken apart.
 
     Attributes:
         url: the URL.
-        uri: what libpq takes: without ``schema``, with ``DEFAULTS``.
+        uri: the URL for libpq: without ``schema``, with ``DEFAULTS``.
         schema: the schema that holds the tables.
         shown: the URL for messages.
-        passwords: what messages must not show.
+        passwords: texts that messages must not show.
     """
 
     url: Secret
@@ -58,7 +58,8 @@ class Location:
 
     @classmethod
     def parse(cls, url: str) -> Self:
-        """
+        """Read a URL.
+
         Raises:
             UsageError: a part of the URL is wrong; the text does not show its password.
         """

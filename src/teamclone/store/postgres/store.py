@@ -45,12 +45,19 @@ class PostgresStore(Store):
 
     @property
     def location(self) -> str:
+        """The store's URL, whose ``repr`` hides the password."""
         return self._location.url
 
     # -- opening ---------------------------------------------------------------------------------------------------
 
     @classmethod
     def open(cls, url: str) -> Self:
+        """Open the store that a URL names.
+
+        Raises:
+            UsageError: the URL is wrong.
+            StoreError: the server cannot be reached, its schema holds no store, or its format is another one.
+        """
         store = cls(Location.parse(url))
         shown = store._location.shown
 
@@ -66,6 +73,12 @@ class PostgresStore(Store):
 
     @classmethod
     def create(cls, url: str) -> Self:
+        """Make a store in the schema that a URL names, or open the one that is there.
+
+        Raises:
+            UsageError: the URL is wrong.
+            StoreError: the server cannot be reached, refuses, or the schema holds other things.
+        """
         store = cls(Location.parse(url))
         store._connections.transaction(store._create)
         return store
@@ -131,12 +144,14 @@ class PostgresStore(Store):
     # -- reading ---------------------------------------------------------------------------------------------------
 
     def match_ids(self) -> list[str]:
+        """Return the ids of the matches, sorted."""
         rows = self._connections.transaction(
             lambda cursor: fetch(cursor, f"select match_id from {self._schema}.matches")
         )
         return sorted(row["match_id"] for row in rows)
 
     def matches(self) -> pa.Table:
+        """Return the table ``matches``, by start, file name and id."""
         fields = schema.MATCHES.fields
         return self._connections.transaction(
             lambda cursor: self._read(
@@ -145,6 +160,7 @@ class PostgresStore(Store):
         )
 
     def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read a match's rows of one table by COPY; see `Store.read_table`."""
         wanted = schema.table(table)
         fields = wanted.select(columns)
         if wanted not in schema.MATCH_TABLES:
@@ -176,6 +192,7 @@ class PostgresStore(Store):
         return cursor.fetch_arrow_table().cast(schema.arrow_schema(fields))
 
     def stream(self, query: str) -> QueryRows:
+        """Answer a query in a read-only transaction on a connection of its own; see `Store.stream`."""
         _check_reads(query)
         connection, cursor = self._ask(query)
         try:
@@ -224,6 +241,7 @@ class PostgresStore(Store):
     # -- writing ---------------------------------------------------------------------------------------------------
 
     def add(self, match: Match) -> Added:
+        """Insert a match in one transaction under the match's lock; see `Store.add`."""
         sources = convert.sources_of(match)
 
         def add(cursor: dbapi.Cursor) -> Added:
@@ -249,6 +267,8 @@ class PostgresStore(Store):
         return self._connections.transaction(add)
 
     def remove(self, match_id: str) -> None:
+        """Delete a match and its rows in all tables; nothing happens where it is not there."""
+
         def remove(cursor: dbapi.Cursor) -> None:
             self._lock(cursor, match_id)
             cursor.execute(f"delete from {self._schema}.matches where match_id = {_text(match_id)}")
@@ -260,10 +280,12 @@ class PostgresStore(Store):
         return Sources(**found[0]) if found else None
 
     def files(self) -> list[FileStatus]:
+        """Return the status of every source file, by path."""
         rows = self._connections.transaction(lambda cursor: fetch(cursor, f"select * from {self._schema}.files"))
         return sorted(map(_status, rows), key=lambda status: status.path)
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
+        """Insert the statuses, or update the rows of files that have one."""
         # In one order, so that two ingests do not wait for each other.
         rows = [_row(status) for status in sorted(statuses, key=lambda status: status.key)]
         if not rows:

@@ -19,7 +19,7 @@ def evaluate(
     seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """Say how good a clone is: on test matches, against unseen opponents, and beside rules without a network."""
+    """Measure how good a clone is: on test matches, on unseen opponents, and beside rules without a network."""
     from teamclone.evaluation.evaluate import evaluate_and_save
     from teamclone.training.run import open_run
 

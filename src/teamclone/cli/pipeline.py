@@ -73,6 +73,6 @@ def pipeline(
 
 @wraps(pipeline)
 def run(**options: Any) -> None:
-    """`pipeline` by the name that it had before."""
+    """Run `pipeline` by the name that it had before."""
     print("teamclone: run is now called pipeline; call teamclone pipeline instead", file=sys.stderr)
     pipeline(**options)

@@ -92,7 +92,7 @@ def play(
 
 
 def line_of(record: Record) -> str:
-    """Say in a line what became of a match."""
+    """Return a line about the outcome of a match."""
     if record.trouble is not None:
         return f"{record.id}: failed after {record.attempt} attempts: {record.trouble.fault}: {record.trouble.text}"
     left, right = record.left, record.right

@@ -115,7 +115,7 @@ def _settled(search: Search) -> list[Trial]:
 
 
 def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
-    """Progress as a bar, one step a trial; of a beam search the trials of the next step are not known yet."""
+    """Show progress as a bar, one step a trial; the trials of a beam search's next step are not known yet."""
 
     def report(search: Search) -> None:
         from teamclone.search.trials import Mode, Status
@@ -130,7 +130,7 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
 
 
 def _lines() -> Callable[[Search], None]:
-    """Progress as lines for a log: one for every trial that ended."""
+    """Show progress as lines for a log: one for every trial that ended."""
     told: set[str] | None = None
 
     def report(search: Search) -> None:
@@ -185,7 +185,7 @@ def _summary(search: Search, *, as_json: bool) -> None:
 
 
 def _settings(trial: Trial) -> str:
-    """``learning_rate 0.0021, dropout 0.1``."""
+    """Return settings as text: ``learning_rate 0.0021, dropout 0.1``."""
 
     def text(value: Any) -> str:
         return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -85,7 +85,7 @@ def run_training(
 
 
 def _in_silence(work: Callable[[], object]) -> None:
-    """Work as one of several processes, of which another one speaks for all."""
+    """Train without output, as one of several processes of which another reports."""
     try:
         work()
     except TeamcloneError:
@@ -95,12 +95,12 @@ def _in_silence(work: Callable[[], object]) -> None:
 
 
 def reporter(bar: Bar, task: TaskID) -> Callable[[Progress], None]:
-    """Shows the progress of a training: on the bar, or as lines where there is no terminal."""
+    """Return a function that shows the progress of a training: a bar, or lines where there is no terminal."""
     return _lines() if bar.disable else _bar(task, bar.update)
 
 
 def _bar(task: TaskID, update: Callable[..., None]) -> Callable[[Progress], None]:
-    """Progress as a bar, one step a batch."""
+    """Show progress as a bar, one step a batch."""
     text = ""
 
     def report(at: Progress) -> None:
@@ -121,7 +121,7 @@ def _bar(task: TaskID, update: Callable[..., None]) -> Callable[[Progress], None
 
 
 def _lines() -> Callable[[Progress], None]:
-    """Progress as lines for a log: one for every tenth of the epochs, and at least one a minute."""
+    """Show progress as lines for a log: one for every tenth of the epochs, and at least one a minute."""
     told = float("-inf")
 
     def report(at: Progress) -> None:

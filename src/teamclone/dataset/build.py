@@ -77,7 +77,7 @@ class DatasetConfig:
 
     @property
     def team(self) -> str:
-        """All teams as one name."""
+        """Name of all teams together."""
         return " + ".join(self.teams)
 
     @property
@@ -87,7 +87,7 @@ class DatasetConfig:
         return tuple(name for name in REPERTOIRE if wanted.get(name, True))
 
     def check(self) -> None:
-        """See that the options go together.
+        """Raise unless the options go together.
 
         Raises:
             UsageError: they do not.
@@ -236,7 +236,7 @@ def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict
 
 
 def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
-    """Whether the dataset in a folder is what ``build_dataset`` would make of the store now."""
+    """Return whether the dataset in a folder is what ``build_dataset`` would make of the store now."""
     from teamclone.dataset.reader import open_dataset  # imports PyTorch, which takes longer than to clean many matches
 
     try:
@@ -250,7 +250,7 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
 
 
 def _options(config: DatasetConfig) -> dict[str, Any]:
-    """A config as the dataset keeps it: what is beyond play_on only where it is asked for."""
+    """Return a config as the dataset keeps it: what is beyond play_on only where it is asked for."""
     options = asdict(config)
     teams = options.pop("teams")
     for name in ("goalkeepers", "set_plays", "idle"):
@@ -289,7 +289,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
 
 
 def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
-    """The teams' matches by match id, the left side first, and how many matches are without them."""
+    """Return the teams' matches by match id, the left side first, and how many matches are without them."""
     if not config.teams or len(set(config.teams)) < len(config.teams):
         raise UsageError(f"expected different teams, got {', '.join(config.teams) or 'none'}; name each once")
     entries: list[_Entry] = []
@@ -348,7 +348,7 @@ def _add(writer: DatasetWriter, match: MatchSamples, *, index: int, split: NDArr
 
 
 def _pad_types(types: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """(n_matches, n_types, n_fields); matches with fewer types repeat type 0."""
+    """Return (n_matches, n_types, n_fields) parameters; matches with fewer types repeat type 0."""
     most = max(1, *map(len, types))
     default = np.array([DEFAULTS[name] for name in FIELDS])
     padded = np.empty((len(types), most, len(FIELDS)), np.float32)
@@ -383,7 +383,7 @@ def _by_kind(counts: Iterable[int], repertoire: Sequence[str]) -> dict[str, int]
 def _report(
     config: DatasetConfig, matches: Sequence[dict[str, Any]], *, rows: NDArray[np.int64], without_team: int
 ) -> dict[str, Any]:
-    """The sums over all matches; ``rows`` is (n_splits, n_kinds)."""
+    """Return the sums over all matches; ``rows`` is (n_splits, n_kinds)."""
     return {
         "team": config.team,
         "matches_without_team": without_team,

@@ -246,7 +246,10 @@ def _with_none(samples: Columns, nothing: NDArray[np.bool_], *, kind: int) -> Co
 
 
 def _nothing(frames: Columns, players: Columns) -> NDArray[np.bool_]:
-    """(n_frames, 22) whether the counters say that a player did nothing: a log that lost commands says so of nobody."""
+    """Return (n_frames, 22) whether the counters show that a player issued no command.
+
+    A log that lost commands shows it of no player.
+    """
     nothing: NDArray[np.bool_] = executed_kind(frames, players) == 0
     nothing &= players[counter_name(CommandKind.DASH)] >= 0
     return nothing
@@ -275,6 +278,6 @@ def _stored(values: NDArray[Any], steps: NDArray[np.float64]) -> NDArray[np.int1
 
 
 def _code(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """A channel as uint8; NaN and what no code can be become layout.NO_CODE."""
+    """Return a channel as uint8; NaN and what no code can be become layout.NO_CODE."""
     known = (values >= 0) & (values < layout.NO_CODE)
     return np.where(known, values, layout.NO_CODE).astype(np.uint8)

@@ -34,7 +34,7 @@ def split_matches(
     test: float = 0.15,
     seed: int = 0,
 ) -> dict[str, Split]:
-    """The split of each match id.
+    """Return the split of each match id.
 
     Within each opponent the matches are ordered by a hash of seed and match id, so the answer depends on nothing but
     the set of matches. Test and validation get their share of all matches; opponents take turns by how much of their
@@ -87,7 +87,9 @@ def split_matches(
 
 
 def split_rows(n: int, *, match_id: str, seed: int = 0) -> NDArray[np.uint8]:
-    """The paper's split: the rows of a match at random, neighbouring cycles on both sides. For comparison: it leaks.
+    """Return the paper's split: the rows of a match at random.
+
+    Neighbouring cycles stand on both sides, so it leaks; it is here for comparison.
 
     Returns:
         (n,) Split values: 95 % TRAIN, the rest halved between VALIDATION and TEST.

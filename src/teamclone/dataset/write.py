@@ -28,7 +28,7 @@ class DatasetWriter:
     """A dataset that grows. What it holds in memory does not."""
 
     def __init__(self, folder: Path, *, where: Path) -> None:
-        """Of an empty folder; ``where`` is its name in errors. Use ``writing_dataset``."""
+        """Begin a dataset in an empty folder; ``where`` is its name in errors. Use ``writing_dataset``."""
         self._folder = folder
         self._where = where
         self._files: dict[tuple[str, str], _ArrayFile] = {}
@@ -123,7 +123,7 @@ class DatasetWriter:
             file.close()
 
     def _check_references(self, types: NDArray[np.float32], n_matches: int, *, n_commands: int) -> None:
-        """Every index points at something: the readers gather without looking."""
+        """Raise unless every index points at something: readers gather without a check."""
         if types.ndim != 3 or types.shape[0] != n_matches or types.shape[2] != len(FIELDS):
             raise DatasetError(
                 f"{self._where}/player_types: expected shape ({n_matches}, types, {len(FIELDS)}), got {types.shape}"
@@ -158,7 +158,7 @@ class _ArrayFile:
         self.rows += len(values)
 
     def finish(self) -> bytes:
-        """Complete the file; the hash of its content."""
+        """Complete the file and return the hash of its content."""
         self._file.seek(0)
         if self._write_header() != self._room:
             raise AssertionError("the header of an array outgrew its room")
@@ -171,7 +171,7 @@ class _ArrayFile:
             self._file.close()
 
     def _write_header(self) -> int:
-        """Write it where the file is; how long it is."""
+        """Write the header where the file is, and return its length in bytes."""
         dtype, start = np.dtype(self._array.dtype), self._file.tell()
         np.lib.format.write_array_header_1_0(
             self._file, {"descr": dtype.str, "fortran_order": False, "shape": (self.rows, *self._array.shape)}
@@ -181,7 +181,7 @@ class _ArrayFile:
 
 @contextmanager
 def writing_dataset(folder: Path | str, *, replace: bool = False) -> Iterator[DatasetWriter]:
-    """A writer of a dataset, whose folder appears when it is finished; otherwise nothing is left of it.
+    """Yield a writer of a dataset; its folder appears when it is finished, else nothing is left of it.
 
     Args:
         folder: where to.
@@ -242,7 +242,7 @@ def write_dataset(
 
 
 def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: str) -> dict[str, NDArray[Any]]:
-    """The arrays of a table in the layout's types, all of one length."""
+    """Return the arrays of a table in the layout's types, all of one length."""
     names = [array.name for array in spec]
     if sorted(given) != sorted(names):
         raise DatasetError(f"{where}: expected the arrays {', '.join(names)}, got {', '.join(given)}")
@@ -256,7 +256,7 @@ def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: 
 
 
 def _part(folder: Path, what: str) -> Path:
-    """A folder beside the dataset for what is not finished."""
+    """Return a folder beside the dataset for what is not finished."""
     return folder.with_name(f".{folder.name}.{what}.part")
 
 

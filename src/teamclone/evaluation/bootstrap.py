@@ -17,7 +17,7 @@ FEW_MATCHES = 10
 
 
 def draw(n_matches: int, *, seed: int, n_resamples: int = N_RESAMPLES) -> Counts:
-    """How often each match occurs in each resample: (n_resamples, n_matches), every row sums to n_matches.
+    """Return how often each match occurs in each resample: (n_resamples, n_matches), every row sums to n_matches.
 
     The same seed gives the same resamples, so differences between models of the same matches are paired.
     """
@@ -26,13 +26,13 @@ def draw(n_matches: int, *, seed: int, n_resamples: int = N_RESAMPLES) -> Counts
 
 
 def resample(sums: Sums, occurrences: Counts) -> Sums:
-    """The totals of every resample: per-match sums (n_matches, ...) become (n_resamples, ...)."""
+    """Return the totals of every resample: per-match sums (n_matches, ...) become (n_resamples, ...)."""
     weights = occurrences.astype(np.float64)
     return Sums(*(np.tensordot(weights, values, axes=1) for values in sums))
 
 
 def interval(values: NDArray[np.floating], *, level: float = LEVEL) -> tuple[Floats, Floats]:
-    """Percentile interval over the first axis, ignoring NaN; NaN where nothing is known (Efron 1979).
+    """Return a percentile interval over the first axis, ignoring NaN; NaN where all are (Efron 1979).
 
     A figure that is undefined in some resamples (the recall of a command that few matches hold) gets its interval from
     the others.

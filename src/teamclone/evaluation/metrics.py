@@ -25,7 +25,7 @@ CALIBRATION_BINS = 15
 
 
 def even_log_loss(commands: Sequence[str]) -> dict[str, float]:
-    """What an even guess over the whole range of a command's parameters has as `Predictions.parameter_log_loss`."""
+    """Return the `Predictions.parameter_log_loss` of an even guess over the whole range of a command's parameters."""
     return {
         name: sum(
             math.log(item.limit if item.unit == "power" else 2 * item.limit)
@@ -66,31 +66,34 @@ class Sums(NamedTuple):
     paper_error: Floats
 
     def select(self, matches: NDArray[np.integer] | NDArray[np.bool_]) -> Sums:
-        """Some entries of the first axis."""
+        """Return some entries of the first axis."""
         return Sums(*(values[matches] for values in self))
 
     def total(self) -> Sums:
-        """Summed over the first axis."""
+        """Return the sums over the first axis."""
         return Sums(*(values.sum(axis=0) for values in self))
 
 
 def confusion_matrix(
     kind: NDArray[np.integer], predicted: NDArray[np.integer], *, n_kinds: int = len(CLONED)
 ) -> Counts:
-    """(n_kinds, n_kinds) rows with [command given, command predicted], from (n,) indices of commands."""
+    """Return (n_kinds, n_kinds) rows with [command given, command predicted], from (n,) indices of commands."""
     counts = np.bincount(kind * n_kinds + predicted, minlength=n_kinds * n_kinds)
     return counts.astype(np.int64).reshape(n_kinds, n_kinds)
 
 
 def log_loss(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
-    """(n,) -ln of the probability of what happened, nats; a probability of 0 counts as the smallest float32 step."""
+    """Return (n,) -ln of the probability of the true command, nats; 0 counts as the smallest float32 step."""
     given = probabilities[np.arange(len(kind)), kind].astype(np.float64)
     loss: Floats = -np.log(np.clip(given, np.finfo(np.float32).eps, 1.0))
     return loss
 
 
 def brier(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
-    """(n,) squared distance to the one-hot truth, summed over the commands (Brier 1950): 0 best, 2 worst."""
+    """Return (n,) squared distance to the one-hot truth, summed over the commands.
+
+    0 is best, 2 worst (Brier 1950).
+    """
     distance = probabilities.astype(np.float64)
     distance[np.arange(len(kind)), kind] -= 1.0
     squared: Floats = np.square(distance).sum(axis=1)
@@ -100,7 +103,9 @@ def brier(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Flo
 def parameter_errors(
     predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
 ) -> Floats:
-    """(n, parameters) absolute errors in power, degrees around the circle and metres; NaN where nothing was issued.
+    """Return (n, parameters) absolute errors.
+
+    In power, degrees around the circle and metres; NaN where nothing was issued.
 
     Around the circle 179 and -179 degrees are 2 degrees apart.
     """
@@ -114,7 +119,9 @@ def parameter_errors(
 def paper_errors(
     predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
 ) -> Floats:
-    """(n,) the paper's regression error: the mean over all outputs in [-1, 1], zero expected where nothing was issued.
+    """Return (n,) the paper's regression error.
+
+    It is the mean over all outputs in [-1, 1], zero expected where nothing was issued.
 
     Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it says little about
     the error of a command's parameter; it is here to be compared with the published 0.069.
@@ -126,7 +133,7 @@ def paper_errors(
 
 
 def confidence_edges(probabilities: NDArray[np.floating], bins: int = CALIBRATION_BINS) -> Floats:
-    """Inner edges that cut the rows into bins of equal mass by the probability of their predicted command.
+    """Return inner edges that cut rows into bins of equal mass by the probability of the predicted command.
 
     Shape (bins - 1,) or fewer: equal confidences are never parted.
     """
@@ -136,7 +143,7 @@ def confidence_edges(probabilities: NDArray[np.floating], bins: int = CALIBRATIO
 
 
 def measure(outcome: Predictions, *, edges: Floats | None = None) -> tuple[Counts, Sums]:
-    """The matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
+    """Return the matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
 
     Args:
         outcome: what was predicted and what happened.
@@ -182,7 +189,7 @@ def measure(outcome: Predictions, *, edges: Floats | None = None) -> tuple[Count
 
 
 def ratio(numerator: NDArray[np.number], denominator: NDArray[np.number]) -> Floats:
-    """Element by element; NaN where the denominator is 0, because such a rate is undefined, not 0."""
+    """Divide element by element; NaN where the denominator is 0, because such a rate is undefined, not 0."""
     top, bottom = np.broadcast_arrays(np.asarray(numerator, np.float64), np.asarray(denominator, np.float64))
     result: Floats = np.divide(top, bottom, out=np.full(top.shape, np.nan), where=bottom != 0)
     return result
@@ -215,7 +222,7 @@ class Rates(NamedTuple):
 
 
 def rates(confusion: NDArray[np.number]) -> Rates:
-    """Rates per command of (..., commands, commands) confusion matrices; NaN where undefined."""
+    """Return rates per command of (..., commands, commands) confusion matrices; NaN where undefined."""
     confusion = np.asarray(confusion, np.float64)
     hits = np.diagonal(confusion, axis1=-2, axis2=-1)
     support, predicted = confusion.sum(axis=-1), confusion.sum(axis=-2)
@@ -261,7 +268,7 @@ class Scores(NamedTuple):
 
 
 def scores(sums: Sums) -> Scores:
-    """Figures of every entry of the leading axes; NaN where there is no row."""
+    """Return figures of every entry of the leading axes; NaN where there is no row."""
     rows = sums.confusion.sum(axis=(-2, -1))
     rate = rates(sums.confusion)
     gap = np.abs(sums.bin_hits - sums.bin_confidence).sum(axis=-1)
@@ -277,7 +284,7 @@ def scores(sums: Sums) -> Scores:
 
 
 def _mean_where(values: Floats, where: NDArray[np.bool_]) -> Floats:
-    """Mean over the last axis of the values at True."""
+    """Return the mean over the last axis of the values at True."""
     return ratio(np.where(where, np.nan_to_num(values), 0.0).sum(axis=-1), where.sum(axis=-1))
 
 
@@ -290,7 +297,7 @@ class Curve(NamedTuple):
 
 
 def top_label_curve(sums: Sums) -> Curve:
-    """How often the predicted command was right, by the confidence in it; bins without rows are left out."""
+    """Return how often the predicted command was right, by the confidence in it; bins without rows are left out."""
     filled = sums.bin_count > 0
     count = sums.bin_count[filled]
     return Curve(
@@ -299,7 +306,7 @@ def top_label_curve(sums: Sums) -> Curve:
 
 
 def command_curve(outcome: Predictions, kind: int, bins: int = CALIBRATION_BINS) -> Curve:
-    """How often a command was given, by the probability said for it, over all rows in bins of equal mass."""
+    """Return how often a command was given, by the probability said for it, over all rows in bins of equal mass."""
     said = outcome.probabilities[:, kind].astype(np.float64)
     if len(said) == 0:
         return Curve(rows=np.zeros(0), confidence=np.zeros(0), observed_frequency=np.zeros(0))
@@ -319,7 +326,7 @@ def command_curve(outcome: Predictions, kind: int, bins: int = CALIBRATION_BINS)
 def median_errors(
     predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
 ) -> Floats:
-    """(parameters,) median absolute error of the commands that carried each parameter; NaN where none did."""
+    """Return (parameters,) median absolute error of the commands that carried each parameter; NaN where none did."""
     error = parameter_errors(predicted, issued, commands)
     medians = np.full(error.shape[1], np.nan)
     for index, column in enumerate(error.T):

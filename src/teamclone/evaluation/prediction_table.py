@@ -302,7 +302,7 @@ def _check(
     frame: NDArray[np.int64],
     channels: tuple[str, ...],
 ) -> None:
-    """See that the frames hold what the model reads, and the types of all players.
+    """Raise unless the frames hold all that the model reads, and the types of all players.
 
     Raises:
         DatasetError: they do not.

@@ -44,7 +44,7 @@ class Predictions:
         return len(self.kind)
 
     def rows(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Predictions:
-        """The outcome of some rows only, by boolean mask or by number."""
+        """Return the outcome of some rows only, by boolean mask or by number."""
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
         some: dict[str, Any] = {name: of[index] for name, of in columns.items() if isinstance(of, np.ndarray)}
         return replace(self, **some)

@@ -1,4 +1,4 @@
-"""One HTML file that tells how good a clone is: readable without a network, on paper, in the light and in the dark."""
+"""One HTML file that shows how good a clone is: without a network, on paper, in light and dark mode."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ PERCENT = {"accuracy", "balanced_accuracy", "ece"}
 
 
 def percent(value: float | None, digits: int = 1) -> str:
-    """0.8455 as ``84.6 %``; what is undefined as a dash."""
+    """Return 0.8455 as ``84.6 %``; an undefined value as a dash."""
     return NOTHING if value is None else f"{number(100 * value, digits)}\N{NARROW NO-BREAK SPACE}%"
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with so many decimals, thousands grouped; what is undefined as a dash."""
+    """Return a number with so many decimals, thousands grouped; what is undefined as a dash."""
     return NOTHING if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def points(value: float | None, digits: int = 1) -> str:
-    """A difference of accuracies, 0.012 as ``+1.2``."""
+    """Return a difference of accuracies, 0.012 as ``+1.2``."""
     return NOTHING if value is None else f"{100 * value:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 3) -> Markup:
-    """A figure and, small beside it, its interval."""
+    """Return a figure and, small beside it, its interval."""
     if value is None or value["value"] is None:
         return Markup(NOTHING)
     write = {"percent": percent, "number": number, "points": points}[kind]
@@ -70,24 +70,24 @@ def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 
 
 
 def split_by_rows(evaluation: Mapping[str, Any]) -> bool:
-    """Whether rows of one match stand on both sides, as in the paper."""
+    """Return whether rows of one match stand on both sides, as in the paper."""
     return str((evaluation["dataset"]["options"] or {}).get("split")) == "rows"
 
 
 def primary_split(evaluation: Mapping[str, Any]) -> str:
-    """The split the headline speaks of: test, or the next best there is."""
+    """Return the split the headline speaks of: test, or the next best there is."""
     there = evaluation["splits"]
     return next(name for name in ("test", "unseen", "validation", "train") if name in there)
 
 
 def best_epoch(history: Sequence[Mapping[str, Any]]) -> int | None:
-    """The epoch of the lowest validation loss."""
+    """Return the epoch of the lowest validation loss."""
     known = [row for row in history if row.get("validation_loss") is not None]
     return int(min(known, key=lambda row: row["validation_loss"])["epoch"]) if known else None
 
 
 def sentences(evaluation: Mapping[str, Any]) -> list[str]:
-    """What the numbers say, in words; every claim depends on them."""
+    """Return the main findings as sentences; each claim depends on the figures."""
     name = primary_split(evaluation)
     section = evaluation["splits"][name]
     team, model, others = evaluation["dataset"]["team"], section["model"], section["baselines"]
@@ -134,7 +134,7 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
 
 
 def verdict(section: Mapping[str, Any]) -> str:
-    """Whether the clone beats the strongest rule, by accuracy and else by its probabilities."""
+    """Return whether the clone beats the strongest rule, by accuracy and else by its probabilities."""
     others = section["baselines"].values()
     gain = max(others, key=lambda other: other["accuracy"]["value"])["accuracy_gain"]
     if (gain["value"] if gain["low"] is None else gain["low"]) > 0:
@@ -149,14 +149,14 @@ def verdict(section: Mapping[str, Any]) -> str:
 
 
 def listing(names: Sequence[str], most: int = 4) -> str:
-    """Some names in a sentence."""
+    """Join some names for a sentence."""
     if len(names) > most:
         return f"{', '.join(names[:most])} and {len(names) - most} more"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Accuracy of rules and clone as rows, the best last, and the paper's for orientation."""
+    """Return the accuracy of rules and clone as rows, the best last, and the paper's for orientation."""
     section = evaluation["splits"][primary_split(evaluation)]
     names = {"majority": "most frequent command", "persistence": "repeat the last command", "markov": "Markov table"}
     rows = [
@@ -170,7 +170,7 @@ def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def calibration_sentence(section: Mapping[str, Any]) -> str:
-    """What the confidence means, at the most confident bin and at the least."""
+    """Return a sentence on calibration, at the most and at the least confident bin."""
     curve = section["calibration"]["predicted_command"]
     if not curve["confidence"]:
         return ""
@@ -183,7 +183,7 @@ def calibration_sentence(section: Mapping[str, Any]) -> str:
 
 
 def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
-    """The commands that lead from match logs to this report; what the record does not know stands in capitals."""
+    """Return the commands that lead from match logs to this report; unknown arguments are in capitals."""
     data, run = evaluation["dataset"], evaluation["run"]
     options = data["options"] or {}
     build = ["teamclone dataset --store STORE", *(f"--team {shlex.quote(team)}" for team in data["teams"])]
@@ -210,7 +210,7 @@ def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
 
 
 def _wrapped(parts: Sequence[str], width: int = 88) -> str:
-    """A long command over several lines, as a shell takes it."""
+    """Return a long command over several lines, as a shell takes it."""
     lines = [""]
     for part in parts:
         if lines[-1] and len(lines[-1]) + len(part) >= width:
@@ -264,7 +264,7 @@ def make_report(
 
 
 def fresh_evaluation(run: Run) -> dict[str, Any] | None:
-    """The saved evaluation, if it speaks of the weights and the dataset that the run has now."""
+    """Return the saved evaluation, if it speaks of the weights and the dataset that the run has now."""
     try:
         evaluation = load_evaluation(run.path / "evaluation.json")
         weights = model_id(run.load_model(evaluation["run"]["checkpoint"]))
@@ -275,7 +275,7 @@ def fresh_evaluation(run: Run) -> dict[str, Any] | None:
 
 
 def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
-    """The saved response times, if they are of these weights."""
+    """Return the saved response times, if they are of these weights."""
     try:
         bench = load_bench(run.path / "bench.json")
         return bench if bench["model_id"] == model_id(run.load_model(checkpoint)) else None
@@ -284,7 +284,7 @@ def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
 
 
 def trained_error(config: Config) -> str:
-    """What a run took as the error of parameters, in words."""
+    """Describe the loss that a run used for parameters."""
     if config.model.head == "mixture":
         return "negative log-likelihood, nats"
     where = "all six outputs" if config.train.parameter_loss == "paper" else "those issued"
@@ -292,7 +292,7 @@ def trained_error(config: Config) -> str:
 
 
 def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, history: Sequence[Any]) -> dict[str, Markup]:
-    """The figures by name; those without data are missing."""
+    """Return the figures by name; those without data are missing."""
     data, splits = evaluation["data"], evaluation["splits"]
     team = evaluation["dataset"]["team"]
     kinds = tuple(data["positions"])
@@ -353,7 +353,7 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
 def render(
     run: Run, evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, *, history: Sequence[Mapping[str, Any]]
 ) -> str:
-    """The report as HTML.
+    """Return the report as HTML.
 
     Args:
         run: the run; its settings are shown.

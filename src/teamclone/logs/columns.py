@@ -56,7 +56,7 @@ COUNTERS = (
 
 
 def counter_name(kind: CommandKind) -> str:
-    """The column that counts the executed commands of a kind: ``count_dash``."""
+    """Return the column that counts the executed commands of a kind: ``count_dash``."""
     return f"count_{kind.name.lower()}"
 
 

@@ -69,7 +69,7 @@ if isal_zlib is not None:
 def read_bytes(
     source: Path | BinaryIO, *, path: Path | None = None, max_bytes: int = MAX_BYTES
 ) -> tuple[bytes, str | None]:
-    """The decompressed content of a log, as far as it can be had.
+    """Return the decompressed content of a log, as far as it can be had.
 
     Args:
         source: a file, or a binary stream at its beginning.
@@ -103,7 +103,7 @@ def read_bytes(
 
 
 def _inflate(raw: bytes, packing: _Packing, *, path: Path | None, max_bytes: int) -> tuple[bytes, str | None]:
-    """Inflates all members of a stream in chunks, so that a bomb is met before it fills the memory."""
+    """Inflate all members of a stream in chunks, so that a bomb is met before it fills the memory."""
     content = io.BytesIO()  # grows in place, where joining pieces would need the memory twice
     problem = None
     inflater = packing.inflater()

@@ -154,7 +154,11 @@ class Match:
         return self.log.event_texts if self.log is not None else ()
 
     def command_text(self, index: int) -> str:
-        """What a command says besides numbers: the payload of ``say``, ``our 9`` of ``attentionto``; else empty."""
+        """Return the text of a command: the payload of ``say``, ``our 9`` of ``attentionto``; else empty.
+
+        Raises:
+            IndexError: there is no command ``index``.
+        """
         if self.log is None:
             raise IndexError(index)
         start, stop = self.log.commands["text_start"][index], self.log.commands["text_stop"][index]
@@ -162,7 +166,10 @@ class Match:
 
 
 def empty_columns(spec: tuple[columns.Column, ...], *shape: int) -> Columns:
-    """Columns of a spec filled with "not in this log": NaN, -1 of the counters, 255 of ``view_quality``, else 0."""
+    """Return columns of a spec, filled with "not in this log".
+
+    That is NaN, -1 of the counters, 255 of ``view_quality``, else 0.
+    """
     made: Columns = {}
     for column in spec:
         dtype = np.dtype(column.dtype)
@@ -176,5 +183,5 @@ def empty_columns(spec: tuple[columns.Column, ...], *shape: int) -> Columns:
 
 
 def default_player_types(n_types: int) -> Columns:
-    """``n_types`` copies of the server's default type, float64."""
+    """Return ``n_types`` copies of the server's default type, float64."""
     return {name: np.full(n_types, value, np.float64) for name, value in types_of.DEFAULTS.items()}

@@ -258,7 +258,7 @@ def read_binary(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:
-    """Version 1: records of one length."""
+    """Cut version 1: records of one length."""
     found = _Records()
     for start in range(0, len(data) - _V1_RECORD + 1, _V1_RECORD):
         mode = struct.unpack_from(">h", data, start)[0]
@@ -274,7 +274,7 @@ def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:
 
 
 def _cut(data: bytes, *, version: int, path: Path | None) -> _Records:
-    """Versions 2 and 3: the mode tells the length."""
+    """Cut versions 2 and 3: a record's mode gives its length."""
     found = _Records()
     position = 4
     while position < len(data):
@@ -310,7 +310,7 @@ def _truncated(data: bytes, *, path: Path | None, byte: int) -> Problem:
 
 
 def _gather(data: bytes, offsets: list[int], dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """The structs at these offsets, shape (n,)."""
+    """Return the structs at these offsets, shape (n,)."""
     index = np.array(offsets, np.int64)[:, None] + np.arange(dtype.itemsize)
     structs: NDArray[np.void] = np.frombuffer(data, np.uint8)[index].view(dtype)[:, 0]
     return structs

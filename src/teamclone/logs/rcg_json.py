@@ -96,7 +96,7 @@ def read_json(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _records(data: bytes, *, start: int, first_line: int, reader: _Reader) -> Iterator[tuple[int | None, Any]]:
-    """(line, record) of each record; the line is None where the array is not written one record a line."""
+    """Yield (line, record) of each record; the line is None where there is not one record a line."""
     lines = data[start:].splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
@@ -267,7 +267,7 @@ class _Reader:
 
 
 def _open(record: Record) -> tuple[str, Any]:
-    """Kind and content of a record of either shape."""
+    """Return the kind and content of a record of either shape."""
     if "type" in record:
         return record["type"], record
     ((kind, body),) = record.items()
@@ -299,6 +299,6 @@ def _team_mark(frame: int, body: Record) -> TeamMark:
 
 
 def _params(body: Record) -> dict[str, float | str]:
-    """Numbers and booleans as float, the rest as text."""
+    """Return numbers and booleans as float, the rest as text."""
     fields = body.get("params", body)
     return {name: value if isinstance(value, str) else float(value) for name, value in fields.items()}

@@ -19,7 +19,7 @@ _SENDER = re.compile(rb"^\d+(?:,\d+)?\tRecv (\S+)_(?:\d{1,2}|Coach): ", re.MULTI
 
 
 def read_commands(data: bytes, *, left: str | None, right: str | None, path: Path | None = None) -> CommandLog:
-    """Reads a command log.
+    """Read a command log.
 
     Args:
         data: the decompressed log.
@@ -87,7 +87,7 @@ def read_commands(data: bytes, *, left: str | None, right: str | None, path: Pat
 
 
 def sender_names(data: bytes) -> list[str]:
-    """Team names in the order in which their first messages came; the first to connect plays on the left."""
+    """Return the team names in order of their first messages; the first to connect plays on the left."""
     return list(dict.fromkeys(name.decode("utf-8", "replace") for name in _SENDER.findall(data)))
 
 

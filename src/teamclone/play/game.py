@@ -109,7 +109,7 @@ class Game:
             self.gone_at = None
 
     def how_ended(self, side: int) -> str:
-        """Say which processes of a team ended by themselves, and how."""
+        """Describe which processes of a team ended by themselves, and how."""
         labels: dict[int, list[str]] = {}
         for label, client in self.clients[side].items():
             code = client.poll()
@@ -302,7 +302,7 @@ class Game:
 
 
 def _ending(code: int | None) -> str:
-    """Say an exit code in words."""
+    """Return an exit code in words."""
     if code is None:
         return "still runs"
     if code < 0:

@@ -151,7 +151,7 @@ class Record:
 
     @property
     def complete(self) -> bool:
-        """Whether the match was played to its end."""
+        """True if the match was played to its end."""
         return self.trouble is None
 
     def to_json(self) -> dict[str, Any]:

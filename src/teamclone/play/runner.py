@@ -186,7 +186,7 @@ def _wanted(out: Path) -> Path:
 
 
 def _known_records(schedule: Schedule, out: Path) -> dict[str, Record]:
-    """Records of the matches that are not to be played, by id."""
+    """Return the records of the matches that are not to be played, by id."""
     known = {fixture.id: _known(fixture, schedule.attempts, out) for fixture in schedule.fixtures}
     return {name: record for name, record in known.items() if record is not None}
 

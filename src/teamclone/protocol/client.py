@@ -65,7 +65,7 @@ class MonitorClient:
         self._socket.close()
 
     def _newest(self) -> Show | None:
-        """The last of the waiting datagrams that is a whole record from the server."""
+        """Return the last of the waiting datagrams that is a whole record from the server."""
         received = []
         for _ in range(_MOST_DATAGRAMS):
             try:

@@ -49,17 +49,17 @@ class Show:
 
     @property
     def over(self) -> bool:
-        """Whether the match has ended."""
+        """True once the match has ended."""
         return self.playmode == PlayMode.TIME_OVER
 
     @property
     def begun(self) -> bool:
-        """Whether the clock runs already."""
+        """True once the clock runs."""
         return self.cycle > 0
 
     @property
     def present(self) -> tuple[frozenset[int], frozenset[int]]:
-        """Numbers of the connected players of the left and of the right team; those sent off are among them."""
+        """Numbers of the connected players of the left and of the right team; those sent off included."""
         left, right = (self.players["state"] != 0).reshape(2, -1)
         return (
             frozenset((np.flatnonzero(left) + 1).tolist()),

@@ -89,7 +89,7 @@ SERVER_DEFAULTS = np.array(list(DEFAULTS.values()))
 
 
 def default(name: str, *, version: int | None = None) -> float:
-    """The default of a parameter in a version of the server, the newest if None."""
+    """Return the default of a parameter in a version of the server, the newest if None."""
     for before, values in _BEFORE:
         if version is not None and version < before and name in values:
             return values[name]
@@ -97,11 +97,11 @@ def default(name: str, *, version: int | None = None) -> float:
 
 
 def number(params: Mapping[str, float | str], name: str, *, version: int | None = None) -> float:
-    """A parameter of a match: what its log says, the default of its server's version where the log has no number."""
+    """Return a parameter of a match: the number in its log, else the default of its server's version."""
     value = params.get(name)
     return float(value) if isinstance(value, int | float) else default(name, version=version)
 
 
 def vector(params: Mapping[str, float | str], *, version: int | None = None) -> NDArray[np.float64]:
-    """(len(FIELDS),) all of FIELDS of a match, as `number` has them."""
+    """Return (len(FIELDS),) all of FIELDS of a match, each by `number`."""
     return np.array([number(params, name, version=version) for name in FIELDS])

@@ -83,7 +83,7 @@ def search(
 
 
 def _begin(config: SearchConfig, dataset: Dataset, folder: Path) -> Search:
-    """A new search, or the one in the folder with what is to be done again waiting."""
+    """Return a new search, or the one in the folder with what is to be done again waiting."""
     of = {"id": dataset.id, "path": str(dataset.path), "team": str(dataset.meta["team"])}
     if not (folder / "search.json").exists():
         return Search(path=folder, config=config, dataset=of, trials=[])
@@ -137,7 +137,7 @@ def _run(state: Search, strategy: Strategy, crew: list[Worker], on_progress: Cal
 
 
 def _next(state: Search, strategy: Strategy) -> Trial | None:
-    """The next trial to run, proposed now if none is waiting."""
+    """Return the next trial to run, proposed now if none is waiting."""
     waiting = [trial for trial in state.trials if trial.status is Status.WAITING]
     if not waiting:
         waiting = strategy.propose(state.trials)

@@ -1,4 +1,4 @@
-"""What to try next, and whether to give a trial up: pure functions of the trials so far."""
+"""The choice of the next trials and of those to give up: pure functions of the trials so far."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ PRUNE_TRIALS, PRUNE_EPOCHS = 5, 2
 
 
 class Strategy(Protocol):
-    """What to try."""
+    """The rule by which a search chooses its trials."""
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
-        """Trials to add now; none as long as the running ones decide, or at the end."""
+        """Return trials to add now; none as long as the running ones decide, or at the end."""
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
-        """Whether to give up a running trial after the epoch it has just finished."""
+        """Return whether to give up a running trial after the epoch it has just finished."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Beam:
         return False
 
     def beams(self, trials: Sequence[Trial]) -> list[list[Trial]]:
-        """The beam after each step, best first."""
+        """Return the beam after each step, best first."""
         last = max((trial.step for trial in trials), default=-1)
         return [
             rank(
@@ -103,7 +103,10 @@ class Beam:
         ]
 
     def neighbours(self, hidden: tuple[int, ...]) -> list[tuple[int, ...]]:
-        """A layer more, as wide as the last or half of it; one layer doubled or halved; the last one dropped."""
+        """Return the neighbours of an architecture.
+
+        A layer more, as wide as the last or half of it; one layer doubled or halved; the last one dropped.
+        """
         found = [(*hidden, hidden[-1]), (*hidden, hidden[-1] // 2)]
         for place, width in enumerate(hidden):
             found += [(*hidden[:place], other, *hidden[place + 1 :]) for other in (2 * width, width // 2)]
@@ -161,7 +164,7 @@ class Study:
         return bool(study.pruner.prune(study, self._frozen(trial)))
 
     def space(self) -> dict[str, Any]:
-        """What is varied: distributions by setting. Samples of an epoch and of validation stay as many."""
+        """Return the distributions by setting. The samples of an epoch and of validation stay as many."""
         from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
         base = self.config.base

@@ -44,7 +44,7 @@ class Objective(StrEnum):
 
     @property
     def sign(self) -> int:
-        """Times this more is better."""
+        """1 if more is better, else -1."""
         return 1 if self is Objective.ACCURACY else -1
 
 
@@ -87,11 +87,11 @@ class Trial:
     error: str | None = None
 
     def begin(self, status: Status) -> None:
-        """Forget what an earlier attempt came to; its epochs are told again."""
+        """Reset the trial for an attempt; the worker sends earlier epochs again."""
         self.status, self.figures, self.curve, self.error = status, {}, [], None
 
     def add(self, record: dict[str, Any], weights: int, objective: Objective) -> None:
-        """Take the record of an epoch; one that is told again replaces all from there on."""
+        """Take the record of an epoch; one that comes again replaces all from there on."""
         value = float(record[f"validation_{objective.figure}"])
         before = self.curve[: record["epoch"] - 1]
         if not before or value * objective.sign > max(past * objective.sign for past in before):
@@ -143,7 +143,7 @@ MAY_GROW = ("iterations", "trials")
 
 
 def rank(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
-    """Best first: finished ones, then those given up, then failed ones, then the rest; of equals the smaller net."""
+    """Sort trials, best first: finished, given up, failed, then the rest; of equals the smaller network."""
     order = (Status.FINISHED, Status.PRUNED, Status.FAILED, Status.RUNNING, Status.WAITING)
 
     def key(trial: Trial) -> tuple[Any, ...]:
@@ -154,7 +154,7 @@ def rank(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
 
 
 def with_settings(config: Config, settings: dict[str, Any]) -> Config:
-    """A config with single values replaced.
+    """Return a config with single values replaced.
 
     Raises:
         UsageError: naming all that is wrong.
@@ -183,7 +183,7 @@ class Search:
     trials: list[Trial]
 
     def ranked(self) -> list[Trial]:
-        """Best first, see `rank`."""
+        """Return the trials, best first, see `rank`."""
         return rank(self.trials, self.config.objective)
 
     def save(self) -> None:

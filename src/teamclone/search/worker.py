@@ -38,7 +38,7 @@ class Task(NamedTuple):
 
 
 class Epoch(NamedTuple):
-    """An epoch was finished; the worker waits to be told whether to give the trial up."""
+    """An epoch was finished; the worker waits for `Worker.answer`, whether to give the trial up."""
 
     record: dict[str, Any]
     weights: int
@@ -76,7 +76,7 @@ class Worker:
         self.connection.send(Task(config, folder))
 
     def take(self) -> tuple[Trial, Epoch | Ended]:
-        """What the worker says of its trial, once there is something to take."""
+        """Return the worker's next message and its trial; waits for it."""
         trial = self.trial
         assert trial is not None
         try:

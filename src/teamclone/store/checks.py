@@ -57,7 +57,7 @@ def _parameter(name: str) -> str:
 
 
 def _states(condition: str, shown: str) -> str:
-    """Players on the field for whom ``condition`` is true; ``shown`` is an SQL text."""
+    """Select the players on the field with ``condition``; ``shown`` is an SQL text."""
     return (
         f"select cycle, concat({_PLAYER}, ' has ', {shown}) as what "
         f"from player_states join frames using (match_id, frame) where {_ON_FIELD} and ({condition}) order by frame"
@@ -239,7 +239,7 @@ CHECKS = (
 
 
 def check_match(tables: Mapping[str, pa.Table]) -> list[Finding]:
-    """The rules that the tables of one match break. The tables are those of ``convert.tables_of``."""
+    """Return the rules that the tables of one match break. The tables are those of ``convert.tables_of``."""
     import duckdb
 
     findings = []

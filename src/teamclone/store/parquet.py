@@ -52,7 +52,7 @@ class ParquetStore(Store):
     """A store in a folder. The layout is described by ``schema.markdown()``."""
 
     def __init__(self, root: Path) -> None:
-        """Of a folder that is known to be a store; use ``open`` or ``create``."""
+        """Name a folder that is known to be a store; use ``open`` or ``create``."""
         self.root = root.absolute()
         self._matches = self.root / "matches"
         self._files = self.root / "files"
@@ -152,7 +152,7 @@ class ParquetStore(Store):
         return QueryRows(reader.schema, _batches(reader))
 
     def _connect(self) -> duckdb.DuckDBPyConnection:
-        """A database in memory with the views: the store may be read-only, moved, or growing meanwhile."""
+        """Return a database in memory with the views: the store may be read-only, moved, or growing meanwhile."""
         connection = duckdb.connect(
             config={
                 "temp_directory": str(Path(tempfile.gettempdir()) / f"teamclone-duckdb-{os.getpid()}"),
@@ -165,7 +165,7 @@ class ParquetStore(Store):
         return connection
 
     def _views(self) -> list[str]:
-        """Statements that define all tables over the files that are there now."""
+        """Return statements that define all tables over the files that are there now."""
         empty = not self.match_ids()
         return [_view(table, None if empty else self._matches) for table in schema.TABLES]
 
@@ -207,7 +207,7 @@ class ParquetStore(Store):
         shutil.rmtree(grave, ignore_errors=True)
 
     def _sources(self, match_id: str) -> Sources | None:
-        """What a match was read from; None if the store has not got it."""
+        """Return the hashes that a match was read from; None if the store has not got it."""
         try:
             return Sources(**json.loads((self._matches / match_id / "meta.json").read_bytes())["sources"])
         except (FileNotFoundError, ValueError, KeyError, TypeError):
@@ -282,7 +282,10 @@ class ParquetStore(Store):
 
 
 def _view(table: Table, matches: Path | None) -> str:
-    """The statement that defines a table over the folders of all matches; without rows where there are none yet."""
+    """Return the statement that defines a table over the folders of all matches.
+
+    It has no rows where there are no matches yet.
+    """
     if table.rows:
         return schema.create_fixed(table)
     if matches is None:
@@ -307,7 +310,7 @@ def _batches(reader: pa.RecordBatchReader) -> Iterator[pa.RecordBatch]:
 
 
 def _sql_error(error: Exception) -> str:
-    """DuckDB's text without its drawing of the query."""
+    """Return DuckDB's text without its drawing of the query."""
     return " ".join(str(error).split("\n\nLINE ")[0].split())
 
 
@@ -316,7 +319,7 @@ def _remedy(path: Path) -> str:
 
 
 def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Sources) -> None:
-    """All files of a match, on disk when this returns."""
+    """Write all files of a match; they are on disk when this returns."""
     for name, rows in tables.items():
         packed = {column: ENCODINGS[column] for column in rows.column_names if column in ENCODINGS}
         pq.write_table(

@@ -84,7 +84,7 @@ class Table:
         return tuple(field.name for field in self.fields)
 
     def select(self, names: Sequence[str] | None) -> tuple[Field, ...]:
-        """The fields of these names, in their order; None for all.
+        """Return the fields of these names, in their order; None for all.
 
         Raises:
             UsageError: a name is no column of this table.
@@ -99,7 +99,7 @@ class Table:
 
 
 def unknown(what: str, name: str, known: tuple[str, ...], *, where: str) -> str:
-    """The text of an error about a name that does not exist, with near matches."""
+    """Return the text of an error about a name that does not exist, with near matches."""
     return f"{where} has no {what} {name!r}; {choose(name, known)}"
 
 
@@ -287,7 +287,7 @@ BY_NAME = {table.name: table for table in TABLES}
 
 
 def table(name: str) -> Table:
-    """The table of a name.
+    """Return the table of a name.
 
     Raises:
         UsageError: there is none; near matches are listed.
@@ -298,7 +298,7 @@ def table(name: str) -> Table:
 
 
 def check_format(number: object, version: object, *, where: str, place: str) -> None:
-    """Refuse a store of another format number.
+    """Raise unless a store has our format number.
 
     Args:
         version: the teamclone that wrote it.
@@ -321,7 +321,7 @@ def check_format(number: object, version: object, *, where: str, place: str) -> 
 
 
 def arrow_schema(fields: tuple[Field, ...]) -> pa.Schema:
-    """Fields as an Arrow schema, with unit and meaning as metadata, so that a Parquet file explains itself."""
+    """Return fields as an Arrow schema, with unit and meaning as metadata, so that a Parquet file explains itself."""
     import pyarrow as pa
 
     types = {
@@ -344,7 +344,7 @@ def arrow_schema(fields: tuple[Field, ...]) -> pa.Schema:
 
 
 def create_fixed(table: Table) -> str:
-    """The SQL statement that defines a table whose rows are fixed."""
+    """Return the SQL statement that defines a table whose rows are fixed."""
     rows = ", ".join(f"({number}, '{word}')" for number, word in table.rows)
     return f"create view {table.name} as select id::smallint as id, name from (values {rows}) as made(id, name)"
 

@@ -31,7 +31,7 @@ class SharedStore:
         return cls(location=store.location, marker=_marker(store.location))
 
     def open(self) -> Store:
-        """The store, in the process that works on it.
+        """Open the store, in the process that works on it.
 
         Raises:
             StoreError: this machine does not see it.

@@ -42,7 +42,7 @@ class MatchCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """All that speaks against it; notes do not."""
+        """All problems but notes."""
         texts = [] if self.error is None else [self.error]
         texts += [str(problem) for problem in self.problems if problem.severity is not Severity.NOTE]
         return texts + [str(finding) for finding in self.findings]
@@ -70,7 +70,7 @@ def validate_store(
 def _in_order(
     function: Callable[[T], MatchCheck], tasks: Sequence[T], *, jobs: int | None, on_progress: OnProgress | None
 ) -> Iterator[MatchCheck]:
-    """The checks of all tasks, in their order."""
+    """Yield the checks of all tasks, in their order."""
     for done, (task, outcome) in enumerate(run_tasks(function, tasks, jobs=jobs, in_order=True), 1):
         if on_progress is not None:
             on_progress(done, len(tasks))

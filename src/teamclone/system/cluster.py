@@ -26,7 +26,7 @@ CLOSE_SECONDS = 2
 
 @contextmanager
 def executor_of(scheduler: str | None, *, jobs: int | None = None) -> Iterator[Executor | None]:
-    """The executor of the cluster at this address; None where no address is given, for processes on this machine.
+    """Return an executor of the cluster at this address; None without an address, for processes on this machine.
 
     Args:
         scheduler: ``tcp://host:port``.

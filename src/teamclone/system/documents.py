@@ -82,7 +82,7 @@ def read_document(
 
 
 def not_a_document(path: Path, what: str, problem: Exception) -> str:
-    """Say that a file is not what it should be: ``run/environment.json: not the description of a run (...)``."""
+    """Return an error text: ``run/environment.json: not the description of a run (...)``."""
     return f"{path}: not {what} ({problem!r})"
 
 
@@ -96,7 +96,7 @@ def check_format(
     error: type[TeamcloneError],
     writer: object = None,
 ) -> None:
-    """Refuse another format number.
+    """Raise unless a document has our format number.
 
     Args:
         found: the format number that was read.

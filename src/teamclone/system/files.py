@@ -27,7 +27,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 def digest(data: bytes) -> str:
-    """16 hex digits that stand for the content."""
+    """Return 16 hex digits that stand for the content."""
     return hashlib.blake2b(data, digest_size=8).hexdigest()
 
 

@@ -35,7 +35,7 @@ DIED: Final = Died()
 
 
 def available_cpus() -> int:
-    """The processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -51,7 +51,7 @@ def run_tasks(
     in_order: bool = False,
     on_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[tuple[T, R | Died]]:
-    """Each task with its result.
+    """Yield each task with its result.
 
     Args:
         function: runs in another process, so it and the tasks must pickle. What it raises is raised here.
@@ -117,7 +117,7 @@ def _run(
 
 
 def _deaths() -> tuple[type[Exception], ...]:
-    """What executors raise for a task whose process died each time it was tried."""
+    """Return the errors that executors raise for a task whose process died each time it was tried."""
     distributed = sys.modules.get("distributed")
     return (BrokenExecutor,) if distributed is None else (BrokenExecutor, distributed.KilledWorker)
 
@@ -146,7 +146,7 @@ class Processes(Executor):
             raise
 
     def _pool(self) -> ProcessPoolExecutor:
-        """The one process of this thread."""
+        """Return the one process of this thread."""
         pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
         if pool is None:
             # Spawned, not forked: threads of Arrow and DuckDB do not survive a fork.

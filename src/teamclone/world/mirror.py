@@ -25,7 +25,7 @@ _CHANNELS[[CHANNEL[name] for name in ("y", "vy", "body", "neck")]] = -1.0
 
 @cache
 def _arguments(commands: tuple[str, ...]) -> Tensor:
-    """(commands, 2) -1 for arguments that change their sign."""
+    """Return (commands, 2), -1 for arguments that change their sign."""
     signs = torch.ones(len(commands), 2)
     for item in parameters_of(commands):
         if item.sided:
@@ -51,7 +51,7 @@ def mirror_state(state: State, places: Tensor) -> State:
 
 
 def mirror_target(target: Target, commands: tuple[str, ...] = CLONED) -> Target:
-    """The commands reflected: turn moments, directions and the y of places negated."""
+    """Return the commands reflected: turn moments, directions and the y of places negated."""
     return Target(target.kind, target.parameters * _arguments(commands).to(target.parameters)[target.kind])
 
 

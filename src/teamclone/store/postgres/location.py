@@ -33,7 +33,10 @@ class Secret(str):
 
 
 def masked(location: str) -> str:
-    """The URL with ``***`` for its password. Up to the last @, since a password may hold one that is not encoded."""
+    """Return the URL with ``***`` for its password.
+
+    Up to the last @, since a password may hold one that is not encoded.
+    """
     location = re.sub(r"^(\w+://[^:@/?]*):.*@", r"\1:***@", location, flags=re.DOTALL)
     return re.sub(r"(password=)[^&]*", r"\1***", location)
 

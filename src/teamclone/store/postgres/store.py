@@ -38,7 +38,7 @@ class PostgresStore(Store):
     """
 
     def __init__(self, location: Location) -> None:
-        """Of a schema that is known to be a store; use ``open`` or ``create``."""
+        """Name a schema that is known to be a store; use ``open`` or ``create``."""
         self._location = location
         self._schema = _name(location.schema)
         self._connections = Connections(location)
@@ -84,7 +84,7 @@ class PostgresStore(Store):
         return store
 
     def _is_there(self, cursor: dbapi.Cursor) -> bool:
-        """Whether the schema holds a store of our format.
+        """Return whether the schema holds a store of our format.
 
         Raises:
             StoreError: its format is another one.
@@ -108,7 +108,7 @@ class PostgresStore(Store):
             cursor.execute(statement)
 
     def _definitions(self) -> Iterator[str]:
-        """The statements that make all tables."""
+        """Yield the statements that make all tables."""
         yield f"create table {self._schema}.{MARKER} (format integer not null, teamclone text not null)"
         yield f"insert into {self._schema}.{MARKER} values ({schema.FORMAT}, {_text(__version__)})"
         for table in schema.TABLES:
@@ -203,7 +203,7 @@ class PostgresStore(Store):
         return QueryRows(_plain_schema(reader.schema), self._batches(reader, cursor, connection))
 
     def _ask(self, query: str) -> tuple[dbapi.Connection, dbapi.Cursor]:
-        """A connection of its own that computes the answer to a query."""
+        """Return a connection of its own that computes the answer to a query."""
 
         def ask() -> tuple[dbapi.Connection, dbapi.Cursor]:
             connection = self._connections.connect()
@@ -305,7 +305,7 @@ class PostgresStore(Store):
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Nothing to hold and nothing to tidy: a match is a transaction under its own lock."""
+        """Do nothing: a match is a transaction under its own lock."""
         yield
 
     def _lock(self, cursor: dbapi.Cursor, what: str) -> None:
@@ -322,7 +322,7 @@ class PostgresStore(Store):
 
 
 def _trust_keys(cursor: dbapi.Cursor) -> None:
-    """Where the user may, let this transaction skip the check that each row's match exists: it just wrote the match.
+    """Skip the check that each row's match exists, where the user may: this transaction just wrote the match.
 
     The check is one query a row and costs as much as all the rest (docs/howto/postgresql.md).
     """
@@ -334,12 +334,12 @@ def _trust_keys(cursor: dbapi.Cursor) -> None:
 
 
 def _name(name: str) -> str:
-    """A name as SQL."""
+    """Return a name as SQL."""
     return '"' + name.replace('"', '""') + '"'
 
 
 def _text(text: str) -> str:
-    """A text as SQL."""
+    """Return a text as SQL."""
     return "'" + text.replace("'", "''") + "'"
 
 
@@ -350,7 +350,7 @@ _QUERIES = ("select", "with", "values", "table")
 
 
 def _check_reads(query: str) -> None:
-    """Say clearly what is no query; what looks like one is the server's to judge."""
+    """Raise on a statement that is clearly no query; the server judges the rest."""
     found = _FIRST_WORD.match(query)
     word = found[1].lower() if found else ""
     if not word:
@@ -363,7 +363,7 @@ def _check_reads(query: str) -> None:
 
 
 def _plain_schema(found: pa.Schema) -> pa.Schema:
-    """The types of an answer without PostgreSQL's own: numeric as double, others as they come (text or bytes)."""
+    """Return the types of an answer without PostgreSQL's own: numeric as double, others as text or bytes."""
 
     def plain(kind: pa.DataType) -> pa.DataType:
         if not isinstance(kind, pa.OpaqueType):
@@ -381,7 +381,7 @@ def _plain(column: pa.Array, kind: pa.DataType) -> pa.Array:
 
 
 def _escaped(text: str | None) -> str | None:
-    r"""A text that PostgreSQL takes: zero bytes and bytes of file names that are no UTF-8 become ``\u0000``."""
+    r"""Return a text that PostgreSQL takes: zero bytes and bytes of file names that are no UTF-8 become ``\u0000``."""
     if text is None:
         return None
     return re.sub("[\\\\\0\ud800-\udfff]", lambda sign: rf"\u{ord(sign[0]):04x}" if sign[0] != "\\" else r"\\", text)

@@ -1,4 +1,4 @@
-"""What every command shares: tables, JSON, progress, failing."""
+"""Parts that all commands share: tables, JSON, progress, errors."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def print_summary(evaluation: dict[str, Any]) -> None:
 
 
 def _print_splits(splits: dict[str, Any]) -> None:
-    """Print the figures of every split beside those of the baselines, and what limits them."""
+    """Print the figures of every split beside those of the baselines, and their limits."""
     from teamclone.evaluation.bootstrap import FEW_MATCHES
 
     figures = (("accuracy", "accuracy", 3), ("cross_entropy", "CE, nats", 3), ("ece", "ECE", 3), ("brier", "Brier", 3))

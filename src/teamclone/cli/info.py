@@ -103,7 +103,7 @@ def as_text(found: dict[str, Any]) -> str:
     ranked = sorted(found["commands"].items(), key=lambda item: -item[1])
     lines = [
         found["path"],
-        f"  {left['name'] or 'nobody'} {left['score']} : {right['score']} {right['name'] or 'nobody'}{shoot_out}",
+        f"  {left['name'] or 'no team'} {left['score']} : {right['score']} {right['name'] or 'no team'}{shoot_out}",
         f"  log version {found['log_version']}{server}{'' if found['complete'] else ', not closed by the server'}",
         f"  {found['frames']} frames{cycles}, {found['play_on_frames']} in play_on",
         f"  {sum(found['commands'].values())} commands of players"

@@ -53,7 +53,7 @@ def search(
     """Train many times to find settings: layers, the rest by Optuna, or optimisers compared. Give it again to go on."""
     from teamclone.training.config import load_config
 
-    # Before PyTorch is imported: a wrong setting is told at once.
+    # Before PyTorch is imported, so that a wrong setting is reported at once.
     base = load_config(preset, overrides or [])
 
     from teamclone.dataset.reader import open_dataset
@@ -131,16 +131,16 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
 
 def _lines() -> Callable[[Search], None]:
     """Show progress as lines for a log: one for every trial that ended."""
-    told: set[str] | None = None
+    reported: set[str] | None = None
 
     def report(search: Search) -> None:
-        nonlocal told
+        nonlocal reported
         settled = _settled(search)
-        if told is None:  # nothing has ended yet but in earlier calls
-            told = {trial.name for trial in settled}
+        if reported is None:  # nothing has ended yet but in earlier calls
+            reported = {trial.name for trial in settled}
         for trial in settled:
-            if trial.name not in told:
-                told.add(trial.name)
+            if trial.name not in reported:
+                reported.add(trial.name)
                 print(f"{trial.name}: {_line(trial)}", file=sys.stderr, flush=True)
 
     return report

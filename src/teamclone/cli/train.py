@@ -55,7 +55,7 @@ def train(
         from teamclone.training.run import open_run
 
         config = override(open_run(out).config, overrides or [])
-    else:  # Before PyTorch is imported: a wrong setting is told at once.
+    else:  # Before PyTorch is imported, so that a wrong setting is reported at once.
         config = load_config(preset or "best", overrides or [])
     run_training(config, dataset, out, resume=resume, as_json=as_json)
 
@@ -122,15 +122,15 @@ def _bar(task: TaskID, update: Callable[..., None]) -> Callable[[Progress], None
 
 def _lines() -> Callable[[Progress], None]:
     """Show progress as lines for a log: one for every tenth of the epochs, and at least one a minute."""
-    told = float("-inf")
+    reported_at = float("-inf")
 
     def report(at: Progress) -> None:
-        nonlocal told
+        nonlocal reported_at
         if not at.epoch:
             return
         now, tenths = time.monotonic(), 10 * at.epoch // at.epochs - 10 * (at.epoch - 1) // at.epochs
-        if at.record is not None and (tenths or now - told > 60):
-            told = now
+        if at.record is not None and (tenths or now - reported_at > 60):
+            reported_at = now
             print(f"epoch {at.epoch}/{at.epochs}: {_line(at)}", file=sys.stderr, flush=True)
 
     return report

@@ -28,11 +28,11 @@ from teamclone.system.workers import Died, run_tasks
 from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS
 
 AHEAD = 64
-"""Cleaned matches that a cluster may hold ready: more than one writer takes from it in a second, in 300 MB."""
+"""Cleaned matches that a cluster may hold ready, about 300 MB: more than one writer takes in a second."""
 
 
 class SplitBy(StrEnum):
-    """What is kept apart: whole matches, or the paper's rows at random."""
+    """The unit of the split: whole matches, or the paper's rows at random."""
 
     MATCH = "match"
     ROWS = "rows"
@@ -40,7 +40,7 @@ class SplitBy(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DatasetConfig:
-    """What goes into a dataset.
+    """The settings of a dataset.
 
     Attributes:
         teams: the teams to clone, as their logs name them. Each is seen as attacking +x and coming first, so a match of
@@ -51,7 +51,7 @@ class DatasetConfig:
         train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. A team may
             give its goalkeeper another number than usual. A field player then wears the usual one, which a network
             that knows players by their numbers has otherwise never seen.
-        goalkeepers: model goalkeepers as everybody else, in every split, and ``catch`` as a command.
+        goalkeepers: model goalkeepers like the other players, in every split, and ``catch`` as a command.
         set_plays: take the commands of all play modes that have a Situation, not only of play_on, and ``move`` as one.
         idle: take cycles without a body command as samples of ``none``.
         test_matches, validation_matches: match ids or parts of log names that must fall there; the other split
@@ -218,13 +218,12 @@ def _nothing_left(out: Path, config: DatasetConfig, report: dict[str, Any]) -> D
     left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
     return DatasetError(
         f"{out}: no command of {config.team} is left after cleaning ({left}). "
-        "Matches without a command log have none to give, and before log version 3 nothing tells what was "
-        "executed"
+        "Matches without a command log have no commands, and logs before version 3 do not show which were executed"
     )
 
 
 def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict[str, Any]) -> dict[str, Any]:
-    """Return what ``dataset.json`` says beside counts."""
+    """Return the content of ``dataset.json`` beside counts."""
     return {
         "team": config.team,
         **({"teams": config.teams} if len(config.teams) > 1 else {}),
@@ -236,7 +235,7 @@ def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict
 
 
 def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
-    """Return whether the dataset in a folder is what ``build_dataset`` would make of the store now."""
+    """Return whether the dataset in a folder equals that which ``build_dataset`` would make of the store now."""
     from teamclone.dataset.reader import open_dataset  # imports PyTorch, which takes longer than to clean many matches
 
     try:
@@ -250,7 +249,7 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
 
 
 def _options(config: DatasetConfig) -> dict[str, Any]:
-    """Return a config as the dataset keeps it: what is beyond play_on only where it is asked for."""
+    """Return a config as the dataset keeps it: options beyond play_on only where they are on."""
     options = asdict(config)
     teams = options.pop("teams")
     for name in ("goalkeepers", "set_plays", "idle"):

@@ -30,8 +30,8 @@ def epoch_order(
         slice_rows: how long a slice should be.
         draws: (n,) how often each row is to come in a round, on average over the rounds; in one round it comes that
             often rounded down or up. Their sum, rounded, is the number of rows of a round.
-        repeat: of r times fewer rows than a slice should have an epoch takes sqrt(r) rounds, rounded, half way between
-            as many passes and as many steps as with enough of them.
+        repeat: with fewer rows than ``slice_rows`` an epoch makes round(sqrt(slice_rows / rows)) rounds, a compromise
+            between one pass over the rows and as many steps as ``slice_rows`` would take.
     """
     rows = _shuffled(n, seed)
     total = n if draws is None else max(1, round(float(draws.sum(dtype=np.float64))))

@@ -94,7 +94,7 @@ class Dataset:
         )
 
     def to(self, device: torch.device) -> Dataset:
-        """Return the same with all arrays in the memory of a device, where ``rows`` have to lie and answers will."""
+        """Return the dataset with all arrays in the memory of a device, for ``rows`` and answers there."""
         return replace(
             self,
             frames={name: array.to(device) for name, array in self.frames.items()},
@@ -255,7 +255,7 @@ def _table(folder: Path, arrays: tuple[Array, ...], *, rows: int) -> dict[str, T
 
 
 def _open(path: Path, *, dtype: str, shape: Sequence[int | None]) -> Tensor:
-    """Map an array into memory and see that it is what the layout says; None in ``shape`` is any length."""
+    """Map an array into memory and check it against the layout; None in ``shape`` is any length."""
     try:
         # Copy-on-write, because torch warns of read-only memory. Nothing here writes.
         values: NDArray[Any] = np.load(path, mmap_mode="c", allow_pickle=False)

@@ -1,4 +1,4 @@
-"""Which match is for training, validation and test: whole matches, by hash, stratified by opponent."""
+"""The split into training, validation and test: whole matches, by hash, stratified by opponent."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAPER_TRAIN_SHARE = 0.95
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchKey:
-    """What splitting knows of a match; one between two teams that are both modelled has a key of each."""
+    """A match, for splitting; one between two teams that are both modelled has a key of each."""
 
     match_id: str
     opponent: str

@@ -25,7 +25,7 @@ _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
 
 
 class DatasetWriter:
-    """A dataset that grows. What it holds in memory does not."""
+    """A dataset that is written part by part; its use of memory does not grow."""
 
     def __init__(self, folder: Path, *, where: Path) -> None:
         """Begin a dataset in an empty folder; ``where`` is its name in errors. Use ``writing_dataset``."""
@@ -86,7 +86,7 @@ class DatasetWriter:
                 with a ``side`` of "right" where the modelled team was that; and ``commands``, unless they are CLONED.
 
         Raises:
-            DatasetError: what was added does not fit together.
+            DatasetError: the parts added do not fit together.
         """
         missing = [key for key in ("team", "matches") if key not in meta]
         if missing:
@@ -256,12 +256,12 @@ def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: 
 
 
 def _part(folder: Path, what: str) -> Path:
-    """Return a folder beside the dataset for what is not finished."""
+    """Return the path of a folder beside the dataset for unfinished work."""
     return folder.with_name(f".{folder.name}.{what}.part")
 
 
 def _tidy(folder: Path) -> None:
-    """Remove what killed writers of this dataset left."""
+    """Remove the remains of killed writers of this dataset."""
     for left in folder.parent.iterdir():
         if left.name.startswith(f".{folder.name}.") and left.suffix == ".part":
             with suppress(OSError), held(left):  # unless its writer lives

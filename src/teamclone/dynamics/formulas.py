@@ -31,7 +31,7 @@ def radians(degrees: Value) -> Value:
 
 
 def wrap(angle: Value) -> Value:
-    """Return the same angle in [-pi, pi)."""
+    """Return an angle in [-pi, pi)."""
     return _of(angle).remainder(angle + math.pi, 2 * math.pi) - math.pi
 
 
@@ -53,8 +53,8 @@ def cycles_over(distance: Value, speed: Value, decay: Value, *, least: float = 0
     """Return the cycles in which a body of this speed covers a distance, the inverse of `roll`; not whole.
 
     Args:
-        least: what part of the speed is taken to be left where the distance is never covered; with 0 the answer is
-            infinite or not a number there.
+        least: the share of the speed that is taken to be left where the distance is never covered; with 0 the answer
+            is infinite or not a number there.
     """
     left = 1.0 - distance * (1.0 - decay) / speed
     xp = _of(left)
@@ -120,7 +120,7 @@ def kicked(
     Args:
         velocity: of the ball before, as logged.
         power, direction: of the kick; the direction is that on the pitch: body plus argument.
-        rate: what `kick_rate` gives.
+        rate: see `kick_rate`.
     """
     xp = _of(direction)
     x, y = limited(rate * power * xp.cos(direction), rate * power * xp.sin(direction), ball_accel_max)
@@ -205,7 +205,7 @@ def rested(
     """Return stamina, effort, recovery and capacity after the end of a cycle (``player.cpp``, updateStamina).
 
     Args:
-        stamina: what the commands of the cycle have left.
+        stamina: after the commands of the cycle.
         server: parameters of the server by name: anything with ``server["stamina_max"]``.
     """
     xp = _of(stamina, effort)
@@ -224,6 +224,6 @@ def rested(
 
 
 def _like(values: Value, number: Value) -> Value:
-    """Return a number as what stands beside it: PyTorch's minimum and maximum take tensors only."""
+    """Return a number in the type of ``values``: PyTorch's minimum and maximum take tensors only."""
     xp = _of(values, number)
     return number if xp is np else xp.as_tensor(number, dtype=values.dtype, device=values.device)

@@ -1,4 +1,4 @@
-"""What needs no network: rules that know the training counts and, at most, the player's last command.
+"""Baselines without a network: rules from the training counts and, at most, the player's last command.
 
 A clone that does not beat them has learned nothing. Each gives probabilities, so that the same figures apply.
 """
@@ -15,7 +15,7 @@ from teamclone.evaluation.predictions import Predictions
 from teamclone.rcss.commands import CLONED, parameters_of
 
 SMOOTHING = 1.0
-"""Added to every count (Laplace), so that what the training matches never showed keeps a probability."""
+"""Added to every count (Laplace), so that events missing in the training matches keep a probability."""
 
 NAMES = ("majority", "persistence", "markov")
 
@@ -71,7 +71,7 @@ class Baselines:
         raise ValueError(f"unknown baseline {name!r}, expected one of {', '.join(NAMES)}")
 
     def answer(self, name: str, outcome: Predictions) -> Predictions:
-        """Return the same rows with a baseline's answers in place of the model's."""
+        """Return the rows of ``outcome`` with a baseline's answers in place of the model's."""
         probabilities = self.table(name)[outcome.last].astype(np.float32)  # -1, none known, is the last row
         parameters = np.broadcast_to(self.parameters.astype(np.float32), outcome.parameters.shape)
         return replace(

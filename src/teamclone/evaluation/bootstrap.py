@@ -13,13 +13,13 @@ from teamclone.evaluation.metrics import Counts, Floats, Sums
 N_RESAMPLES = 1000
 LEVEL = 0.95
 FEW_MATCHES = 10
-"""Below, a percentile interval is clearly too narrow; that of two matches is just these two. Readers are told so."""
+"""With fewer matches a percentile interval is clearly too narrow, and the report warns of it."""
 
 
 def draw(n_matches: int, *, seed: int, n_resamples: int = N_RESAMPLES) -> Counts:
     """Return how often each match occurs in each resample: (n_resamples, n_matches), every row sums to n_matches.
 
-    The same seed gives the same resamples, so differences between models of the same matches are paired.
+    Equal seeds give equal resamples, so differences between two models on the same matches are paired.
     """
     generator = np.random.default_rng(seed)
     return generator.multinomial(n_matches, np.full(n_matches, 1.0 / n_matches), size=n_resamples).astype(np.int64)

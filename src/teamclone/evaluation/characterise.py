@@ -1,4 +1,4 @@
-"""``characterise``: what the commands of a dataset look like, whatever a model makes of them."""
+"""``characterise``: the distribution of a dataset's commands, without a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``describe``: the figures of one split, from predictions beside what happened."""
+"""``describe``: the figures of one split, from predictions beside the true commands."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def describe(
     Args:
         outcome: the split.
         baselines: counts of the training split.
-        matches: what is known of each match, indexed by ``outcome.match``; ``match_id`` and ``opponent`` are read. The
+        matches: facts of each match, indexed by ``outcome.match``; ``match_id`` and ``opponent`` are read. The
             two entries of a match in which both teams are modelled count as one.
         seed: of the bootstrap.
     """
@@ -72,7 +72,7 @@ def describe(
             "accuracy_gain": _value(gain, gains),
             "cross_entropy_skill": _value(skill, skills),
         }
-        # Made for networks that answer zero for parameters not issued; of a constant guess it says nothing.
+        # Made for networks that answer zero for parameters not issued; it has no meaning for a constant guess.
         del section["baselines"][name]["paper_mae"]
     guess = baselines.answer("majority", outcome)
     medians = metrics.median_errors(guess.parameters, guess.issued, guess.commands)
@@ -96,7 +96,7 @@ def unseen_numbers(
     paper's does, has then never seen a field player with the number that the goalkeeper had in training.
 
     Args:
-        outcome: the split. players: (n,) who acted in it. trained: who acted in the rows of training.
+        outcome: the split. players: (n,) the actors in it. trained: the actors in the rows of training.
     """
     right = outcome.probabilities.argmax(axis=1) == outcome.kind
     return {
@@ -129,7 +129,7 @@ def _scores(point: Scores, spread: Scores | None) -> dict[str, Value]:
 
 
 def _situations(outcome: Predictions) -> dict[str, Any]:
-    """Return ``situations``: rows, accuracy and cross-entropy in play_on and by who restarts.
+    """Return ``situations``: rows, accuracy and cross-entropy in play_on and by the team that restarts.
 
     Nothing where all is play_on.
     """

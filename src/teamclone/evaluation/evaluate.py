@@ -1,4 +1,4 @@
-"""``evaluate``: how good a run is on the splits of a dataset, as the numbers behind tables, figures and report."""
+"""``evaluate``: the quality of a run on the splits of a dataset, the numbers behind tables, figures and report."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ def evaluation_path(run: Run, evaluation: dict[str, Any]) -> Path:
 
 
 def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
-    """Write an evaluation into its run, whole or not at all; where it went."""
+    """Write an evaluation into its run, whole or not at all; return its file."""
     path = evaluation_path(run, evaluation)
     write_document(path, evaluation)
     return path

@@ -255,7 +255,7 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
     top = calibration["predicted_command"]
     left.plot(top["confidence"], top["observed_frequency"], color=ACCENT, marker="o", markersize=4)
     left.set_title("the predicted command")
-    left.set_xlabel("probability said")
+    left.set_xlabel("predicted probability")
     left.set_ylabel("share that came true")
     for kind, curve in calibration["commands"].items():
         if sum(curve["rows"]):
@@ -268,7 +268,7 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
                 label=kind,
             )
     right.set_title("each command")
-    right.set_xlabel("probability said")
+    right.set_xlabel("predicted probability")
     right.legend(loc="upper left")
     return figure
 

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from teamclone.training.run import Run
 
 FORMAT = 1
-"""Of bench.json."""
+"""Format number of bench.json."""
 N_PREDICTIONS = 20_000
 WARM_UP = 200
 N_STATES = 512
-"""Different situations that the predictions take in turn."""
+"""Number of different situations that the predictions take in turn."""
 
 
 def measure_run(
@@ -74,8 +74,8 @@ def measure_latency(
 ) -> dict[str, Any]:
     """Time ``n`` predictions of one state each and of batches of 22, in microseconds, on one CPU thread.
 
-    Timed is what a user calls: raw state in, probabilities and parameters out, features and normalisation included;
-    reading the state is not.
+    The time is that of a user's call: raw state in, probabilities and parameters out, with features and normalisation;
+    without reading the state.
 
     Raises:
         DatasetError: the dataset has no samples, or a match lacks what the model needs.

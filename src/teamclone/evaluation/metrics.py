@@ -37,12 +37,14 @@ def even_log_loss(commands: Sequence[str]) -> dict[str, float]:
 
 
 class Sums(NamedTuple):
-    """What every figure is computed from. Leading axes (...) are matches or resamples; none for a total.
+    """The sums from which every figure is computed.
+
+    Leading axes (...) are matches or resamples; none for a total.
 
     Attributes:
         confusion: (..., commands, commands) rows with [command given, command predicted].
         log_loss: (...) sum of -ln(probability of the command given), nats.
-        brier: (...) sum of squared distances between probabilities and what happened, 0 to 2 a row.
+        brier: (...) sum of squared distances between probabilities and the one-hot truth, 0 to 2 a row.
         bin_count: (..., bins) rows by confidence in the predicted command.
         bin_confidence: (..., bins) their summed confidence.
         bin_hits: (..., bins) those predicted right.
@@ -123,7 +125,7 @@ def paper_errors(
 
     It is the mean over all outputs in [-1, 1], zero expected where nothing was issued.
 
-    Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it says little about
+    Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it hardly measures
     the error of a command's parameter; it is here to be compared with the published 0.069.
     """
     limits = np.array([item.limit for item in parameters_of(commands)])
@@ -146,7 +148,7 @@ def measure(outcome: Predictions, *, edges: Floats | None = None) -> tuple[Count
     """Return the matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
 
     Args:
-        outcome: what was predicted and what happened.
+        outcome: the predictions and the true commands.
         edges: inner edges of the confidence bins; None cuts this outcome into bins of equal mass.
     """
     edges = confidence_edges(outcome.probabilities) if edges is None else edges
@@ -289,7 +291,7 @@ def _mean_where(values: Floats, where: NDArray[np.bool_]) -> Floats:
 
 
 class Curve(NamedTuple):
-    """A reliability curve, (bins,) each: rows, mean probability said, share that came true."""
+    """A reliability curve, (bins,) each: rows, mean predicted probability, share that came true."""
 
     rows: Floats
     confidence: Floats
@@ -306,19 +308,19 @@ def top_label_curve(sums: Sums) -> Curve:
 
 
 def command_curve(outcome: Predictions, kind: int, bins: int = CALIBRATION_BINS) -> Curve:
-    """Return how often a command was given, by the probability said for it, over all rows in bins of equal mass."""
-    said = outcome.probabilities[:, kind].astype(np.float64)
-    if len(said) == 0:
+    """Return how often a command was given, by its predicted probability, over all rows in bins of equal mass."""
+    predicted = outcome.probabilities[:, kind].astype(np.float64)
+    if len(predicted) == 0:
         return Curve(rows=np.zeros(0), confidence=np.zeros(0), observed_frequency=np.zeros(0))
-    edges = np.unique(np.quantile(said, np.arange(1, bins) / bins))
-    place = np.searchsorted(edges, said, side="right")
+    edges = np.unique(np.quantile(predicted, np.arange(1, bins) / bins))
+    place = np.searchsorted(edges, predicted, side="right")
     count = np.bincount(place, minlength=len(edges) + 1).astype(np.float64)
     filled = count > 0
-    total_said = np.bincount(place, weights=said, minlength=len(count))
+    summed = np.bincount(place, weights=predicted, minlength=len(count))
     total_true = np.bincount(place, weights=(outcome.kind == kind).astype(np.float64), minlength=len(count))
     return Curve(
         rows=count[filled],
-        confidence=(total_said / np.maximum(count, 1))[filled],
+        confidence=(summed / np.maximum(count, 1))[filled],
         observed_frequency=ratio(total_true, count)[filled],
     )
 

@@ -29,7 +29,7 @@ SPLIT_NAMES = {
 }
 FIGURES = (
     ("accuracy", "accuracy", "share of commands predicted right"),
-    ("cross_entropy", "cross-entropy, nats", "surprise at what was done; lower is better"),
+    ("cross_entropy", "cross-entropy, nats", "surprise at the true commands; lower is better"),
     ("brier", "Brier score", "squared error of the probabilities, 0 to 2; lower is better"),
     ("ece", "calibration error", "gap between confidence and accuracy; lower is better"),
     ("balanced_accuracy", "balanced accuracy", "mean recall of the commands"),
@@ -46,7 +46,7 @@ def percent(value: float | None, digits: int = 1) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number with so many decimals, thousands grouped; what is undefined as a dash."""
+    """Return a number with so many decimals, thousands grouped; an undefined value as a dash."""
     return NOTHING if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
@@ -75,7 +75,7 @@ def split_by_rows(evaluation: Mapping[str, Any]) -> bool:
 
 
 def primary_split(evaluation: Mapping[str, Any]) -> str:
-    """Return the split the headline speaks of: test, or the next best there is."""
+    """Return the split of the headline: test, or the next best there is."""
     there = evaluation["splits"]
     return next(name for name in ("test", "unseen", "validation", "train") if name in there)
 
@@ -108,14 +108,14 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
     if model["accuracy"]["low"] is not None:
         low = percent(model["accuracy"]["low"]).removesuffix("\N{NARROW NO-BREAK SPACE}%")
         text += f" (95 % interval {low} to {percent(model['accuracy']['high'])})"
-    said = [f"{text}."]
+    found = [f"{text}."]
 
     persistence, majority = others["persistence"], others["majority"]
-    said.append(
+    found.append(
         f"Repeating the player's last command would be right {percent(persistence['accuracy']['value'])} of the time, "
-        f"always saying the most frequent one {percent(majority['accuracy']['value'])}."
+        f"always predicting the most frequent one {percent(majority['accuracy']['value'])}."
     )
-    said.append(verdict(section))
+    found.append(verdict(section))
 
     unseen = evaluation["splits"].get("unseen")
     if unseen is not None and name == "test":
@@ -126,11 +126,11 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
             if abs(difference) < 0.05
             else f"{abs(difference):.1f} points {'more' if difference > 0 else 'less'}"
         )
-        said.append(
+        found.append(
             f"Against {names}, never met in training, it is right {percent(unseen['model']['accuracy']['value'])} "
             f"of the time, {how}."
         )
-    return said
+    return found
 
 
 def verdict(section: Mapping[str, Any]) -> str:
@@ -226,7 +226,7 @@ def make_report(
     quick_predictions: int = 2000,
     on_progress: Callable[[str, int, int], None] | None = None,
 ) -> Path:
-    """Write the report of a run; what it needs and the run lacks is computed first.
+    """Write the report of a run; missing parts are computed first.
 
     RUN/evaluation.json is made if it is missing or belongs to other weights, RUN/bench.json likewise, with fewer
     predictions than `teamclone bench` takes.
@@ -235,7 +235,7 @@ def make_report(
         run: the run.
         out: the file; None is RUN/report.html.
         quick_predictions: how many single predictions are timed if none were.
-        on_progress: called with the name of the work, what is done and what there is in all.
+        on_progress: called with the name of the work, the steps done and their number.
 
     Returns:
         The file.
@@ -264,7 +264,7 @@ def make_report(
 
 
 def fresh_evaluation(run: Run) -> dict[str, Any] | None:
-    """Return the saved evaluation, if it speaks of the weights and the dataset that the run has now."""
+    """Return the saved evaluation, if it is of the run's present weights and dataset."""
     try:
         evaluation = load_evaluation(run.path / "evaluation.json")
         weights = model_id(run.load_model(evaluation["run"]["checkpoint"]))
@@ -317,7 +317,7 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
         ),
         "reliability": (
             figures.reliability(splits[primary_split(evaluation)]["calibration"]),
-            "Two reliability diagrams: share that came true against probability said; the diagonal is perfect",
+            "Two reliability diagrams: share that came true against predicted probability; the diagonal is perfect",
         ),
     }
     compared = {name: split["model"] for name, split in splits.items()}

@@ -28,7 +28,7 @@ _MAY_MOVE[list(MOVE_MODES)] = True
 def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, has_stoppage: bool) -> NDArray[np.int32]:
     """Return the index of the frame of each (cycle, stoppage), shape of ``cycle``; -1 where there is none.
 
-    Without stoppage counters (servers 12.x) a stamp inside a stoppage cannot be told from its neighbours: -1.
+    Without stoppage counters (servers 12.x) stamps inside a stoppage are ambiguous: -1.
     """
     keys = frames["cycle"].astype(np.int64) * _STOPPAGES + frames["stoppage"]
     if not len(keys) or not len(cycle):
@@ -105,7 +105,7 @@ def executed_kind(frames: Columns, players: Columns) -> NDArray[np.uint8]:
 
     Returns:
         (n_frames, 22) CommandKind ids, 0 for none; a frame without a direct successor has none. Where a kick and a
-        two-leg dash were both executed the kick is named.
+        two-leg dash were both executed it is the kick.
     """
     kinds: NDArray[np.uint8] = np.zeros(players["state"].shape, np.uint8)
     # Written last wins: kick goes above dash.
@@ -128,12 +128,12 @@ def executed_commands(
     Args:
         players: ``columns.PLAYERS`` with the counters, (n_frames, 22).
         frame: (n,) the frame that each command was decided on, which has a successor.
-        slot: (n,) as `slot_of` gives it. kind: (n,) CommandKind ids of BODY_KINDS.
+        slot: (n,) see `slot_of`. kind: (n,) CommandKind ids of BODY_KINDS.
     """
     rose = np.zeros(len(frame), np.bool_)
     for one in np.unique(kind):
         of_kind = kind == one
-        at, who = frame[of_kind], slot[of_kind]
+        at, place = frame[of_kind], slot[of_kind]
         counter = players[counter_name(CommandKind(one))]
-        rose[of_kind] = counter[at + 1, who] > np.maximum(counter[at, who], 0)
+        rose[of_kind] = counter[at + 1, place] > np.maximum(counter[at, place], 0)
     return rose

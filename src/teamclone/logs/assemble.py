@@ -1,4 +1,4 @@
-"""What every reader of game logs does alike: stoppage counter, play modes and scores by frame, teams, player types.
+"""Steps that all readers of game logs share: stoppage counter, play modes, scores, teams, player types.
 
 A log states the play mode and the teams only when they change, before the first frame they hold for. Readers collect
 these statements as *marks*, each with the index of the frame that follows it.
@@ -96,7 +96,7 @@ def frame_columns(
 
 
 def limited_score(value: float) -> int:
-    """Return a score or count of penalties as its column can hold it, whatever a damaged log says.
+    """Return a score or count of penalties limited to its column's range, for damaged logs.
 
     Raises:
         ValueError: it is not a number.
@@ -109,7 +109,7 @@ def limited_score(value: float) -> int:
 def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:
     """Return the left and right team with the last score of the log.
 
-    A name once stated stays, whatever later marks leave out.
+    A name once stated stays, even if later marks leave it out.
     """
     left = next((mark.left for mark in reversed(marks) if mark.left is not None), None)
     right = next((mark.right for mark in reversed(marks) if mark.right is not None), None)
@@ -137,7 +137,7 @@ def checked_type(fields: Mapping[str, float | str]) -> tuple[int, dict[str, floa
 
 
 def player_type_columns(types: Mapping[int, Mapping[str, float]]) -> Columns:
-    """Return the columns of ``player_types.FIELDS``, row = type id; what a log leaves out gets the server's default."""
+    """Return the columns of ``player_types.FIELDS``, row = type id; missing values are the server's defaults."""
     made = default_player_types(max(types, default=-1) + 1)
     for row, fields in types.items():
         for name, value in fields.items():

@@ -1,4 +1,4 @@
-"""``Match``: one match as NumPy columns, and what was wrong with its files."""
+"""``Match``: one match as NumPy columns, and the problems of its files."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Team:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GameLog:
-    """What a game log (.rcg) says, in any of its versions.
+    """The content of a game log (.rcg), in any of its versions.
 
     Attributes:
         log_version: ``"1"`` .. ``"6"`` or ``"json-17"``, ``"json-18"``, ``"json-19"``.
@@ -82,7 +82,7 @@ class GameLog:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandLog:
-    """What a command log (.rcl) says.
+    """The content of a command log (.rcl).
 
     Attributes:
         commands: the columns ``columns.COMMANDS`` plus ``text_start`` and ``text_stop`` (int64 offsets into ``text``).

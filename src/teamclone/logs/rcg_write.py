@@ -29,8 +29,8 @@ _STAMINA = ("stamina", "effort", "recovery", "capacity")
 def write_text(log: Match | GameLog, file: BinaryIO, *, version: TextVersion = 6) -> None:
     """Write a game log as text. Reading it back gives the same columns, at 6 significant digits as the server prints.
 
-    What the version has no place for is left out: the capacity before 5, the focus before 6, and in all of them the
-    stoppage counter, which a reader counts anew.
+    Columns that the version has no place for are left out: the capacity before 5, the focus before 6, and in all of
+    them the stoppage counter, which a reader counts anew.
 
     Raises:
         UsageError: the log lacks columns that the version writes for every player, as older versions do.

@@ -109,8 +109,8 @@ def read_match(source: str | os.PathLike[str] | BinaryIO, *, partner: str | os.P
     """Read a match.
 
     Args:
-        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz or zst. What it is
-            is told by its content.
+        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz or zst. Its content
+            shows which it is.
         partner: the other log. None looks for a file of the same name beside ``source``.
 
     Raises:
@@ -205,7 +205,7 @@ def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Ma
         Problem(
             code="truncated",
             severity=Severity.WARNING,
-            text=f"{source.broken}; kept what could be read",
+            text=f"{source.broken}; the readable part is kept",
             path=source.path,
             byte=len(source.data),
         )
@@ -261,7 +261,7 @@ def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _game_of_commands(data: bytes) -> GameLog:
-    """Return the little a command log says of the match: the names, in the order of connection."""
+    """Return the game that a command log shows: the names, in the order of connection."""
     names: list[str | None] = [*sender_names(data)[:2], None, None]
     return GameLog(
         log_version="none",

@@ -1,7 +1,7 @@
 """Scanning kernels: bytes of a text log to arrays of numbers, compiled by Numba.
 
-They allocate nothing and raise nothing: what they cannot read they mark, and the callers in `shows`, `rcg_text`
-and `rcl` say it in words.
+They allocate nothing and raise nothing: they mark what they cannot read, and the callers in `shows`, `rcg_text` and
+`rcl` make problems of the marks.
 
 Most of a log is short numbers and words of unforeseeable length, so a loop over bytes would cost a mispredicted branch
 each. Where it matters eight bytes are taken as one 64-bit word (first byte lowest) and the questions "which byte is no
@@ -27,7 +27,7 @@ Bytes = NDArray[np.uint8]
 _POWERS = 10.0 ** np.arange(23)
 
 PLAYER_FLOATS = tuple(column.name for column in PLAYERS if column.dtype == "float32")
-"""Where the float columns of a player stand in the array that scan_shows fills."""
+"""The float columns of a player in their order in the array that scan_shows fills."""
 _VIEW_WIDTH = PLAYER_FLOATS.index("view_width")
 _FOCUS = PLAYER_FLOATS.index("focus_distance")
 _STAMINA = PLAYER_FLOATS.index("stamina")
@@ -456,10 +456,10 @@ def scan_shows(
         starts, stops: (n,) where each line begins and ends.
         cycles: (n,); ball: (4, n); floats: (15, n, 22) in the order of PLAYER_FLOATS; types, states, qualities,
             attention_sides, attention_unums: (n, 22); counters: (12, n, 22). Filled; rows of bad lines are undefined.
-        outcomes: (n,) OK or what is wrong; places: (n,) the byte where it is wrong.
+        outcomes: (n,) OK or the code of an error; places: (n,) the byte of the error.
 
     Returns:
-        How many lines are good.
+        Number of good lines.
     """
     good = 0
     for frame in range(len(starts)):
@@ -908,7 +908,7 @@ def scan_commands(
         last: (3, 12, 3) room for the last time, stoppage and order of each side and number.
 
     Returns:
-        How many commands were read.
+        Number of commands read.
     """
     row = _int(0)  # as a literal 0 it would have each helper compiled twice
     for index in range(12):

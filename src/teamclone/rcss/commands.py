@@ -66,7 +66,7 @@ CLONED_KINDS = (CommandKind.DASH, CommandKind.TURN, CommandKind.KICK, CommandKin
 """The commands a model predicts by default, in the order of its output classes (Table II of the paper)."""
 
 CLONED = tuple(kind.name.lower() for kind in CLONED_KINDS)
-"""The same as words."""
+"""CLONED_KINDS as words."""
 
 REPERTOIRE = (*CLONED, "catch", "move", "none")
 """All that a dataset may have and a model predict, in this order; ``none`` is a cycle without a body command.

@@ -28,6 +28,6 @@ def rotate_angle(degrees: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def wrap_degrees(degrees: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return the same directions in [-180, 180)."""
+    """Return directions in degrees, any shape, in [-180, 180)."""
     wrapped: NDArray[np.floating] = np.mod(degrees + 180.0, 360.0) - 180.0
     return wrapped

@@ -1,7 +1,7 @@
-"""Parameters of the server that decide what happens in a cycle, with their defaults (rcssserver `serverparam.cpp`).
+"""Parameters of the server that enter the computations of a cycle, with their defaults (rcssserver `serverparam.cpp`).
 
 A log names those of its match, and every computation takes them from there: `number` and `vector` give the default of
-a version only for what a log leaves out. Datasets hold them in the order of `FIELDS`: after a change here raise
+a version only where a log leaves one out. Datasets hold them in the order of `FIELDS`: after a change here raise
 `dataset.layout.FORMAT`.
 """
 
@@ -19,7 +19,7 @@ DEFAULTS: dict[str, float] = {
     "ball_rand": 0.05,
     "ball_speed_max": 3.0,
     "ball_accel_max": 2.7,
-    # Players, beside what their type says (`player_types`).
+    # Players, beside their type (`player_types`).
     "player_rand": 0.1,
     "player_accel_max": 1.0,
     "kick_rand": 0.1,
@@ -69,7 +69,7 @@ DEFAULTS: dict[str, float] = {
     "nr_extra_halfs": 2.0,
     "simulator_step": 100.0,
 }
-"""Those of version 19."""
+"""Defaults of version 19."""
 
 _BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
     (17, {"back_dash_rate": 0.6, "min_catch_angle": -180.0, "max_catch_angle": 180.0, "min_dash_power": -100.0}),
@@ -85,7 +85,7 @@ SERVER_FIELD = {name: index for index, name in enumerate(FIELDS)}
 """Index of a parameter there."""
 
 SERVER_DEFAULTS = np.array(list(DEFAULTS.values()))
-"""(len(FIELDS),) float64, DEFAULTS as `vector` has them."""
+"""(len(FIELDS),) float64, DEFAULTS in the order of `FIELDS`."""
 
 
 def default(name: str, *, version: int | None = None) -> float:

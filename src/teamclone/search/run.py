@@ -47,7 +47,7 @@ def search(
         on_progress: called whenever a trial begins, finishes an epoch, or ends.
 
     A trial that fails is noted and the others go on; it is tried again when the search is gone on with. Finished
-    trials are kept, unfinished ones go on from their last epoch with what is left of ``train.max_minutes``.
+    trials are kept, unfinished ones go on from their last epoch with the rest of ``train.max_minutes``.
 
     Raises:
         UsageError: options that do not go together, or a dataset of other commands than the model's.
@@ -83,7 +83,7 @@ def search(
 
 
 def _begin(config: SearchConfig, dataset: Dataset, folder: Path) -> Search:
-    """Return a new search, or the one in the folder with what is to be done again waiting."""
+    """Return a new search, or the one in the folder, with unfinished and failed trials waiting."""
     of = {"id": dataset.id, "path": str(dataset.path), "team": str(dataset.meta["team"])}
     if not (folder / "search.json").exists():
         return Search(path=folder, config=config, dataset=of, trials=[])

@@ -24,13 +24,13 @@ from teamclone.training.config import WITH_ADAM, TrainConfig
 OPTIMISERS = ("adam", "rmsprop", "adagrad")
 
 RATES = (1e-2, 1e-3, 1e-4)
-"""What the paper compared."""
+"""Learning rates that the paper compared."""
 
 BATCH_FACTORS = (0.25, 0.5, 1, 2)
 """Batch sizes that a study tries, as multiples of that of the settings it starts from."""
 
 PRUNE_TRIALS, PRUNE_EPOCHS = 5, 2
-"""A study gives no trial up before so many were finished, nor in its first epochs, so many."""
+"""A study prunes only once PRUNE_TRIALS trials have finished, and no trial in its first PRUNE_EPOCHS epochs."""
 
 
 class Strategy(Protocol):
@@ -63,7 +63,7 @@ class Beam:
             if not hidden or not self._fits(hidden)
         ]
         if "model.hidden" in config.held:
-            problems.append("the beam search chooses model.hidden; say where it starts with --start")
+            problems.append("the beam search chooses model.hidden; set its first architectures with --start")
         if problems:
             raise UsageError("; ".join(problems))
 

@@ -32,7 +32,7 @@ class Mode(StrEnum):
 
 
 class Objective(StrEnum):
-    """The figure on the validation matches that a search looks for; of a trial that of its best epoch."""
+    """The figure on the validation matches that a search optimises; a trial's is that of its best epoch."""
 
     ACCURACY = "accuracy"
     CROSS_ENTROPY = "cross-entropy"
@@ -104,7 +104,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchConfig:
-    """What to search, and how.
+    """The settings of a search.
 
     Attributes:
         mode: see `Mode`.
@@ -172,7 +172,7 @@ class Search:
 
     Attributes:
         path: its folder.
-        config: what is searched.
+        config: its settings.
         dataset: ``id``, ``path`` and ``team`` of the dataset.
         trials: in the order in which they were proposed.
     """

@@ -1,7 +1,7 @@
 """Processes that train the trials of a search, one trial at a time each.
 
-They are no tasks of `system.workers`: a process keeps its dataset open from trial to trial, reports every epoch, and is
-told in return whether to give the trial up.
+They are no tasks of `system.workers`: a process keeps its dataset open from trial to trial, reports every epoch, and
+learns in return whether to give the trial up.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Worker:
 
 @contextmanager
 def _no_interrupts() -> Iterator[None]:
-    """Leave Ctrl-C to this process: what is started meanwhile never sees it, also while it still imports."""
+    """Leave Ctrl-C to this process: one that is started meanwhile never gets it, even while it imports."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -115,11 +115,11 @@ def _no_interrupts() -> Iterator[None]:
 
 
 class _PrunedError(Exception):
-    """Leaves `loop.train`."""
+    """Raised inside `loop.train` to leave it."""
 
 
 def _work(connection: Connection[Any, Any], dataset_path: Path) -> None:
-    """Train what comes in until the other end closes."""
+    """Train the trials that arrive until the other end closes."""
     start_worker()
     dataset = open_dataset(dataset_path)
     while True:
@@ -131,7 +131,7 @@ def _work(connection: Connection[Any, Any], dataset_path: Path) -> None:
             ended = _train(task, dataset, connection)
         except TeamcloneError as error:
             ended = Ended(Status.FAILED, str(error))
-        except (EOFError, BrokenPipeError):  # nobody is there to tell
+        except (EOFError, BrokenPipeError):  # the other end is gone
             return
         except Exception as error:
             ended = Ended(Status.FAILED, f"{type(error).__name__}: {error}")
@@ -143,14 +143,14 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
     config, folder = task
     weights = parameter_count(Clone(config.model))
 
-    def tell(record: dict[str, Any]) -> None:
+    def report(record: dict[str, Any]) -> None:
         connection.send(Epoch(record, weights))
         if connection.recv():
             raise _PrunedError
 
-    def report(progress: loop.Progress) -> None:
+    def on_progress(progress: loop.Progress) -> None:
         if progress.record is not None:
-            tell(progress.record)
+            report(progress.record)
 
     resume, left = is_run(folder), config.train.max_minutes
     try:
@@ -158,7 +158,7 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
             run = open_run(folder)
             history = run.history()
             for record in history:
-                tell(record)
+                report(record)
             # Another number of threads would round otherwise than in the epochs before.
             config = with_settings(config, {"train.threads": run.config.train.threads})
             minutes = [record["seconds"] / 60 for record in history]
@@ -167,7 +167,7 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
                 if left < np.mean(minutes):
                     return Ended(Status.FINISHED, None)
         now = with_settings(config, {"train.max_minutes": left})
-        loop.train(now, dataset, folder, resume=resume, on_progress=report)
+        loop.train(now, dataset, folder, resume=resume, on_progress=on_progress)
     except _PrunedError:
         return Ended(Status.PRUNED, None)
     if now != config:

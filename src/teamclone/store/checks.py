@@ -1,4 +1,4 @@
-"""Queries that must return no row: what cannot be true of a match, whatever its teams did.
+"""Queries that must return no row: impossible facts of a match, whatever its teams did.
 
 Every query selects ``cycle`` and ``what`` (a text) of each row that is wrong, over the tables of one match. Limits that
 are parameters of the server are taken from the match; where its log does not list them they are not checked.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One rule: ``about`` says what must hold."""
+    """One rule; ``about`` is the rule in words."""
 
     name: str
     about: str

@@ -34,7 +34,7 @@ class Sources:
     command_log: str | None
 
     def cover(self, others: Sources) -> bool:
-        """Return whether a store that has these gains nothing by the others."""
+        """Return whether a store that has these sources would gain nothing from ``others``."""
         return self == others or others.command_log is None
 
 

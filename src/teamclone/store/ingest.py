@@ -89,12 +89,12 @@ def ingest(
         executor: where matches are read, for example on a cluster (``cluster.executor_of``); its workers must see the
             logs and the store under the same paths. None starts processes on this machine.
         jobs: how many, None for one a processor. More than one needs the usual ``if __name__ == "__main__"`` guard.
-        strict: stop at the first file from which something is lost; what was added before stays.
+        strict: stop at the first file from which something is lost; matches added before stay.
 
     Raises:
         UsageError: a path does not exist, here or for a worker, or there is no log under any of them.
         StoreError: the store cannot be written, or a worker does not see it.
-        ClusterError: the connection to the executor's workers was lost; what was added stays.
+        ClusterError: the connection to the executor's workers was lost; matches added before stay.
         LogError: with ``strict``, the first thing that was wrong.
     """
     start = time.monotonic()

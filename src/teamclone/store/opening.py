@@ -1,4 +1,4 @@
-"""Which kind of store a location names."""
+"""Opening a store by its location."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The embedded store: one folder of Parquet files a match, asked through DuckDB."""
+"""The embedded store: one folder of Parquet files a match, queried through DuckDB."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ class ParquetStore(Store):
                 try:
                     folder.rename(home)
                 except OSError as error:
-                    # The same match came from two files at once, and the other was first.
+                    # Two files of one match were read at once, and the other was first.
                     if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
                         raise
                     return Added.UNCHANGED
@@ -245,7 +245,7 @@ class ParquetStore(Store):
                     self._renew_database()
 
     def _tidy(self) -> None:
-        """Throw away what a killed writer left.
+        """Delete the remains of killed writers.
 
         Under another name first: a worker that lives on though its connection is lost must not find its folder half
         emptied and put that among the matches.
@@ -305,7 +305,7 @@ def _quoted(text: str) -> str:
 def _batches(reader: pa.RecordBatchReader) -> Iterator[pa.RecordBatch]:
     try:
         yield from reader
-    except (pa.ArrowException, OSError) as error:  # what DuckDB finds wrong while it computes rows
+    except (pa.ArrowException, OSError) as error:  # an error while DuckDB computes rows
         raise UsageError(_sql_error(error)) from None
 
 
@@ -349,7 +349,7 @@ def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Source
 
 
 def _sync(path: Path) -> None:
-    """Make what was written to this file, or renamed in this folder, last through a power cut, where the system can."""
+    """Sync a file's content or a folder's entries to disk, to survive a power cut; not on Windows."""
     if sys.platform == "win32":
         return
     handle = os.open(path, os.O_RDONLY)

@@ -100,13 +100,13 @@ class Store(Protocol):
         """Return the status of every source file ever ingested, by path."""
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
-        """Keep the status of these files, in place of what was known of them."""
+        """Keep the status of these files, in place of an older status."""
 
     def writing(self) -> AbstractContextManager[None]:
         """Return a context in which an ingest writes.
 
-        A store in a folder takes one at a time, tidies what a killed one left and, at the end, renews what other
-        programs read; a server takes many.
+        A store in a folder takes one at a time, deletes the remains of a killed one and, at the end, renews the
+        database file for other programs; a server takes many.
 
         Raises:
             StoreError: another ingest holds it.

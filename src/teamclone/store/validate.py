@@ -1,4 +1,4 @@
-"""Is a match what it should be? Logs before they are ingested, and the matches of a store."""
+"""Checks of matches: of logs before they are ingested, and of the matches of a store."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ OnProgress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchCheck:
-    """What was found about one match.
+    """The findings about one match.
 
     Attributes:
         name: its file, or its id in a store.
         error: why nothing could be read, else None.
-        problems: what was odd about its files; of a stored match none, they are in its table ``problems``.
+        problems: problems of its files; none for a stored match, whose are in its table ``problems``.
         findings: the rules that its rows break.
     """
 

@@ -56,12 +56,12 @@ def read_document(
     """Read a document of an expected format.
 
     Args:
-        what: what it is or describes, with its article: ``a run``.
+        what: the thing that it is or describes, with its article: ``a run``.
         number: the format that the caller reads.
-        command: what makes such a document: ``teamclone train``.
-        error: the class of what is raised.
+        command: the command that makes such a document: ``teamclone train``.
+        error: the class of the error.
         folder: the folder that the document describes, which the messages then name; None for a document of its own.
-        again: what to do about another format; None for giving ``command`` again.
+        again: the remedy for another format; None for giving ``command`` again.
 
     Raises:
         error: the document is missing, is none, or has another format number.
@@ -103,8 +103,8 @@ def check_format(
         number: the one that this version reads.
         what: the kind of the document, without an article.
         where: its place.
-        again: what to do.
-        error: the class of what is raised.
+        again: the remedy.
+        error: the class of the error.
         writer: the version of teamclone that wrote it; None where that is not known.
 
     Raises:
@@ -128,9 +128,9 @@ def write_errors(
 
     Args:
         where: the folder that is written to.
-        error: the class of what is raised.
-        full: what to do when the disk is full.
-        denied: what to do when it cannot be written for another reason.
+        error: the class of the error.
+        full: the remedy when the disk is full.
+        denied: the remedy when it cannot be written for another reason.
         kinds: the exceptions that are turned.
     """
     try:

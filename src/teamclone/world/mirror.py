@@ -1,4 +1,4 @@
-"""The game reflected at the long axis: what is left becomes right, and players change places with their counterparts.
+"""The game reflected at the long axis: left becomes right, and players change places with their counterparts.
 
 The simulator does not know left from right, so the mirrored command is right in the mirrored situation, if the team
 plays the same on both sides. A player's role goes with the number, hence the left back becomes the right back.
@@ -63,12 +63,11 @@ def mirror_places(mean: NDArray[np.floating]) -> Tensor:
     mean different roles, and no input but the paper's knows an opponent by number.
 
     Args:
-        mean: (22, 2) metres, each player's mean position; NaN for a player who never played, whose counterpart is
-            itself.
+        mean: (22, 2) metres, each player's mean position; NaN for a player that never played, its own counterpart.
     """
     from scipy.optimize import linear_sum_assignment
 
-    # Far away, a player who never played costs nothing as its own counterpart and much as another's.
+    # Far away, a player that never played costs nothing as its own counterpart and much as another's.
     team = np.where(np.isfinite(mean[:N_TEAM]), mean[:N_TEAM], (1e4, 0.0))
     cost = np.square(team[:, None] - team[None] * (1.0, -1.0)).sum(-1)
     # The costs are symmetric, so that the best matching is its own inverse, unless several are equally good.

@@ -40,7 +40,7 @@ PLAYER_COLUMNS = (
     *(channel.name for channel in MEASURED),
     *(counter_name(kind) for kind in BODY_KINDS),
 )
-"""What a view needs of a match's tables."""
+"""Columns of a match's tables that a view needs."""
 
 _FLAGS = (
     (FLAG_ON_FIELD, state_bits.STAND),

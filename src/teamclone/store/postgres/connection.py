@@ -38,7 +38,7 @@ _reached: set[str] = set()
 """The URIs of the servers that this process has connected to."""
 
 ERRORS = (dbapi.Error, OSError)
-"""What the driver raises; the second while it reads the rows of an answer."""
+"""Errors that the driver raises; the second while it reads the rows of an answer."""
 
 
 class Connections:
@@ -104,7 +104,7 @@ class Connections:
         if _passing(error):
             return StoreError(
                 f"{shown}: lost the connection ({message}); "
-                "what was added before stays, try again when the server is back"
+                "matches added before stay, try again when the server is back"
             )
         if asked and "multiple commands" in message:
             return UsageError("expected one SQL statement, got several")

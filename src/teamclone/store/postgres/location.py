@@ -24,7 +24,7 @@ DEFAULTS = {
 
 
 class Secret(str):
-    """A URL that shows its password to nobody who only looks at it: its ``repr`` is masked, also inside others'."""
+    """A URL whose ``repr`` hides its password, also inside the ``repr`` of other objects."""
 
     __slots__ = ()
 

@@ -232,7 +232,7 @@ class PostgresStore(Store):
                     [_plain(column, kind) for column, kind in zip(batch.columns, plain.types, strict=True)],
                     schema=plain,
                 )
-        except (*ERRORS, pa.ArrowException) as error:  # what the server finds wrong while it computes
+        except (*ERRORS, pa.ArrowException) as error:  # an error while the server computes rows
             raise self._connections.failure(error, asked=True) from None
         finally:
             reader.close()
@@ -309,7 +309,7 @@ class PostgresStore(Store):
         yield
 
     def _lock(self, cursor: dbapi.Cursor, what: str) -> None:
-        """Wait until nobody else writes ``what``, and hold it until this transaction ends."""
+        """Wait until no other transaction writes ``what``, and lock it until this one ends."""
         # Where the writer's machine vanishes, the server notices and lets go.
         fetch(
             cursor,

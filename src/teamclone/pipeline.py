@@ -159,7 +159,8 @@ def run_pipeline(
     """Do the missing work, stage by stage. Stopped or killed, the next call resumes it.
 
     Args:
-        out: where the matches go, as in `play.runner.play`; store, dataset and run lie beside them.
+        pipeline: the schedule with its sections, see `load_pipeline`.
+        out: the folder for the matches, see `play.runner.play`; store, dataset and run lie beside them.
         executor: where matches are played and cleaned; None is this machine.
         jobs: how many at once, as in `play.runner.play`.
         watch: called while it goes on.

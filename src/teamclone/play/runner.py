@@ -105,13 +105,15 @@ def play(
     When this ends, however it ends, servers and clients end with it.
 
     Args:
-        out: where the matches go; with those of an earlier call that was stopped or killed.
+        schedule: the matches, see `load_schedule`.
+        out: the folder for the matches; it may hold those of an earlier call that was stopped or killed.
         store: each match is added to it as it ends, and those that were there before.
         executor: where matches are played, for example on a cluster (``cluster.executor_of``); its workers must see
             ``out`` and the teams under the same paths. None plays on this machine.
         jobs: how many at once, None for one a processor; in real time, where it must not be busy, one for two.
         retry_failed: forget the attempts at matches that failed before.
-        on_progress: called with how many matches are accounted for, and how many there are.
+        on_progress: called with the number of matches that are complete or failed, and of all.
+        on_record: called with the record of each match, as soon as it is known.
 
     Raises:
         UsageError: ``out`` holds matches of another schedule, or a worker does not see it.

@@ -43,6 +43,9 @@ def search(
     """Search, or go on with a search, and draw its figure; `trials` describes the folder.
 
     Args:
+        config: what to vary, and the settings that all trials share.
+        dataset: the dataset that all trials train on.
+        out: folder of the search; it may hold one that was stopped.
         jobs: processes that train at a time. Where ``train.threads`` is 0 they share the processors.
         on_progress: called whenever a trial begins, finishes an epoch, or ends.
 

@@ -86,10 +86,12 @@ def ingest(
 
     Args:
         paths: logs and folders; a log finds its partner, folders are searched through.
+        store: the store to add to.
         executor: where matches are read, for example on a cluster (``cluster.executor_of``); its workers must see the
             logs and the store under the same paths. None starts processes on this machine.
         jobs: how many, None for one a processor. More than one needs the usual ``if __name__ == "__main__"`` guard.
         strict: stop at the first file from which something is lost; matches added before stay.
+        on_progress: called with the matches that are done and their number.
 
     Raises:
         UsageError: a path does not exist, here or for a worker, or there is no log under any of them.

@@ -56,6 +56,7 @@ def read_document(
     """Read a document of an expected format.
 
     Args:
+        path: the document.
         what: the thing that it is or describes, with its article: ``a run``.
         number: the format that the caller reads.
         command: the command that makes such a document: ``teamclone train``.

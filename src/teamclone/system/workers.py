@@ -55,6 +55,7 @@ def run_tasks(
 
     Args:
         function: runs in another process, so it and the tasks must pickle. What it raises is raised here.
+        tasks: the arguments of ``function``, one for each call.
         executor: where the tasks run, for example on a Dask cluster. None starts processes on this machine.
         jobs: how many processes to start; None for one a processor. With one job, or one task, all runs in this
             process.

@@ -37,7 +37,8 @@ def mirror_state(state: State, places: Tensor) -> State:
     """Return the situations reflected: y, vy, body and neck negated, now and before; players in exchanged places.
 
     Args:
-        places: (22,) int64, each player's counterpart, as `mirror_places` gives them.
+        state: the situations.
+        places: (22,) int64, each player's counterpart, see `mirror_places`.
     """
     ball, channels = _BALL.to(state.ball), _CHANNELS.to(state.players)
     return state._replace(

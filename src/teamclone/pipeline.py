@@ -163,7 +163,7 @@ def run_pipeline(
         out: the folder for the matches, see `play.runner.play`; store, dataset and run lie beside them.
         executor: where matches are played and cleaned; None is this machine.
         jobs: how many at once, as in `play.runner.play`.
-        watch: called while it goes on.
+        watch: called during the work.
 
     Returns:
         The report on the matches, and the result of each stage that there was.

@@ -30,7 +30,7 @@ def search(
     jobs: Annotated[int, typer.Option(min=1, help="Processes that train at a time.")] = 1,
     beam: Annotated[
         int | None,
-        typer.Option(min=1, help="beam: architectures that a step goes on from; default 3.", show_default=False),
+        typer.Option(min=1, help="beam: architectures kept after each step; default 3.", show_default=False),
     ] = None,
     iterations: Annotated[
         int | None, typer.Option(min=0, help="beam: steps after the first; default 5.", show_default=False)

@@ -89,7 +89,7 @@ def split_matches(
 def split_rows(n: int, *, match_id: str, seed: int = 0) -> NDArray[np.uint8]:
     """Return the paper's split: the rows of a match at random.
 
-    Neighbouring cycles stand on both sides, so it leaks; it is here for comparison.
+    Neighbouring cycles fall into different splits, so it leaks; it is here for comparison.
 
     Returns:
         (n,) Split values: 95 % TRAIN, the rest halved between VALIDATION and TEST.

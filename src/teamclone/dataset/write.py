@@ -181,7 +181,7 @@ class _ArrayFile:
 
 @contextmanager
 def writing_dataset(folder: Path | str, *, replace: bool = False) -> Iterator[DatasetWriter]:
-    """Yield a writer of a dataset; its folder appears when it is finished, else nothing is left of it.
+    """Yield a writer of a dataset; its folder appears only when it is finished.
 
     Args:
         folder: where to.

@@ -32,7 +32,7 @@ def resample(sums: Sums, occurrences: Counts) -> Sums:
 
 
 def interval(values: NDArray[np.floating], *, level: float = LEVEL) -> tuple[Floats, Floats]:
-    """Return a percentile interval over the first axis, ignoring NaN; NaN where all are (Efron 1979).
+    """Return a percentile interval over the first axis, ignoring NaN; NaN where all are NaN (Efron 1979).
 
     A figure that is undefined in some resamples (the recall of a command that few matches hold) gets its interval from
     the others.

@@ -232,7 +232,7 @@ def _curve(curve: metrics.Curve) -> dict[str, list[Any]]:
 def _opponents(
     used: NDArray[np.int64], sums: Sums, matches: Sequence[dict[str, Any]], *, seed: int
 ) -> list[dict[str, Any]]:
-    """Return the split by opponent, the best understood first."""
+    """Return the split by opponent, the most accurate first."""
     names = np.array([str(matches[index]["opponent"]) for index in used], object)
     table = []
     for name in sorted(set(names)):

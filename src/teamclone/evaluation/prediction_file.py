@@ -68,7 +68,7 @@ def predict_logs(
         on_progress: called with the log, the rows done and the rows of this match.
 
     Returns:
-        What became of each log, in their order.
+        The outcome for each log, in their order.
 
     Raises:
         UsageError: the ending of ``out`` is unknown, or neither or both of team and side are named.

@@ -70,7 +70,7 @@ def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 
 
 
 def split_by_rows(evaluation: Mapping[str, Any]) -> bool:
-    """Return whether rows of one match stand on both sides, as in the paper."""
+    """Return whether rows of one match are in several splits, as in the paper."""
     return str((evaluation["dataset"]["options"] or {}).get("split")) == "rows"
 
 

@@ -28,7 +28,7 @@ LEAST_ROOM = 32 << 20
 
 _POLL_S = 0.05
 _LOOK_S = 2.0
-"""Between two looks at a match that goes on."""
+"""Between two looks at a running match."""
 _GONE_S = 0.3
 """From the first player that is gone to the verdict, in case others follow."""
 _LEAVE_S = 1.0
@@ -153,8 +153,8 @@ class Game:
         """Play from the start of the server to its end. Afterwards call `finish`, whatever happened.
 
         Raises:
-            FailedError: it did not come to its end.
-            StoppedError: it is no longer wanted.
+            FailedError: the match failed.
+            StoppedError: the match is no longer wanted.
         """
         free = shutil.disk_usage(self.folder).free
         if free < LEAST_ROOM:

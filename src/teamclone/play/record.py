@@ -20,7 +20,7 @@ NAME = "match.json"
 
 
 class Fault(StrEnum):
-    """A reason for which a match did not come to its end."""
+    """The reason for which a match failed."""
 
     NO_PORT = "no port"
     """The ports that the server needs are in use."""

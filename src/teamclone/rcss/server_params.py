@@ -77,7 +77,7 @@ _BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
 """Defaults of servers before a version, where they differ."""
 
 OLDEST = 16
-"""The version whose defaults stand for all before it. A log that leaves a parameter out is most likely that old."""
+"""The version whose defaults are used for all before it. A log without a parameter is most likely that old."""
 
 FIELDS = tuple(DEFAULTS)
 """The order of the parameters wherever they stand in an array, ``World.server``."""

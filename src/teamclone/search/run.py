@@ -1,7 +1,6 @@
 """Search for settings by many trainings over one dataset.
 
-The next trial follows from the trials so far alone, so that a search that was stopped goes on as if nothing had
-happened.
+The next trial follows from the trials so far alone, so that a search that was stopped resumes without a difference.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ def search(
     jobs: int = 1,
     on_progress: Callable[[Search], None] = lambda search: None,
 ) -> Search:
-    """Search, or go on with a search, and draw its figure; `trials` describes the folder.
+    """Begin or resume a search, and draw its figure; `trials` describes the folder.
 
     Args:
         config: what to vary, and the settings that all trials share.
@@ -49,7 +48,7 @@ def search(
         jobs: processes that train at a time. Where ``train.threads`` is 0 they share the processors.
         on_progress: called whenever a trial begins, finishes an epoch, or ends.
 
-    A trial that fails is noted and the others go on; it is tried again when the search is gone on with. Finished
+    A trial that fails is noted and the others go on; it is tried again when the search is resumed. Finished
     trials are kept, unfinished ones go on from their last epoch with the rest of ``train.max_minutes``.
 
     Raises:

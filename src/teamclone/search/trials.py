@@ -70,7 +70,7 @@ class Trial:
         settings: where it differs from the settings that all share: ``{"model.hidden": [256, 128]}``.
         step: of a beam search, from 0.
         parent: the trial whose neighbour this one is, in a beam search.
-        status: ``waiting`` also for one that was stopped and goes on when the search does.
+        status: ``waiting`` also for one that was stopped and resumes with the search.
         figures: ``accuracy``, ``cross_entropy`` (nats) and ``loss`` on the validation matches after the best ``epoch``;
             ``epochs`` gone through and their ``seconds``; ``weights``, how many the network has.
         curve: the objective after each epoch.
@@ -109,9 +109,9 @@ class SearchConfig:
     Attributes:
         mode: see `Mode`.
         base: the settings that trials start from.
-        held: settings that a study leaves as ``base`` has them.
+        held: settings that a study does not vary.
         objective: see `Objective`.
-        beam: of a beam search, how many architectures each step goes on from.
+        beam: of a beam search, the number of architectures kept after each step.
         iterations: of a beam search, how many steps it takes after the first architectures.
         smallest: of a beam search, the least width of a layer; a power of two, as ``largest`` and all widths between.
         largest: of a beam search, the greatest.
@@ -136,10 +136,10 @@ OPTIONS = {
     Mode.STUDY: ("trials",),
     Mode.OPTIMISERS: (),
 }
-"""Options that a mode has; no other mode has them."""
+"""The options of each mode; no option belongs to two."""
 
 MAY_GROW = ("iterations", "trials")
-"""Options that may be otherwise when a search goes on."""
+"""Options that may change when a search is resumed."""
 
 
 def rank(trials: Sequence[Trial], objective: Objective) -> list[Trial]:

@@ -152,7 +152,7 @@ class ParquetStore(Store):
         return QueryRows(reader.schema, _batches(reader))
 
     def _connect(self) -> duckdb.DuckDBPyConnection:
-        """Return a database in memory with the views: the store may be read-only, moved, or growing meanwhile."""
+        """Return a database in memory with the views, since the store may be read-only, moved, or growing."""
         connection = duckdb.connect(
             config={
                 "temp_directory": str(Path(tempfile.gettempdir()) / f"teamclone-duckdb-{os.getpid()}"),

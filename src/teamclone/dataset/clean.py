@@ -99,27 +99,18 @@ def clean_match(
         server_params: ranges of the arguments; the server's defaults where one is missing.
         side: the modelled team's, 1 left or -1 right.
         goalkeepers: keep the goalkeeper's commands, too.
-        repertoire: the commands to keep, some of REPERTOIRE. With catch the goalkeeper is modelled like the other
-            players; with move every play mode of a Situation is taken, not only play_on; with none a cycle without a
-            body command is a sample.
+        repertoire: the commands to keep, some of REPERTOIRE. With catch goalkeepers are modelled like other players;
+            with move every play mode of a Situation is taken, not only play_on; with none a cycle without a body
+            command is a sample.
     """
-    with_goalkeepers = "catch" in repertoire
+    everyone = "catch" in repertoire
     in_play = frames_in_play(frames, repertoire)
     where = "in play_on or around a set play" if "move" in repertoire else "in play_on"
     goalie = (players["state"] & state_bits.GOALIE) != 0
     slots = slot_of(commands["side"], commands["unum"])
-    of_field = None if with_goalkeepers or goalkeepers else ~goalie
+    of_field = None if everyone or goalkeepers else ~goalie
     chain = _Chain(commands)
-    _bind(
-        chain,
-        frames,
-        slots,
-        side=side,
-        in_play=in_play,
-        where=where,
-        of_field=of_field,
-        with_goalkeepers=with_goalkeepers,
-    )
+    _bind(chain, frames, slots, side=side, in_play=in_play, where=where, of_field=of_field, everyone=everyone)
     has_command = np.zeros_like(goalie)
     has_command[commands["frame"][chain.rows], slots[chain.rows]] = True
     kinds = [CommandKind[name.upper()] for name in repertoire if name != "none"]
@@ -223,7 +214,7 @@ def _bind(
     in_play: NDArray[np.bool_],
     where: str,
     of_field: NDArray[np.bool_] | None,
-    with_goalkeepers: bool,
+    everyone: bool,
 ) -> None:
     """Keep the commands that took a body slot of a frame in play.
 
@@ -237,7 +228,7 @@ def _bind(
     frame = chain.column("frame")
     chain.keep((frame >= 0) & (frame < len(frames["cycle"]) - 1), "bound to a frame that has a successor")
     chain.keep(in_play[chain.column("frame")], where)
-    if not with_goalkeepers:
+    if not everyone:
         every = np.ones(len(chain.rows), np.bool_)
         chain.keep(
             every if of_field is None else of_field[chain.column("frame"), slots[chain.rows]], "of field players"

@@ -69,7 +69,7 @@ def progress(what: str) -> Progress:
 
 
 def values_of(settings: Iterable[str]) -> dict[str, Any]:
-    """Return the values of ``KEY=VALUE`` texts by key, see `settings.value_of`."""
+    """``KEY=VALUE`` texts, see `settings.value_of`."""
     values: dict[str, Any] = {}
     for setting in settings:
         key, equals, text = setting.partition("=")

@@ -284,7 +284,7 @@ def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
 
 
 def trained_error(config: Config) -> str:
-    """Describe the loss that a run used for parameters."""
+    """What a run took as the error of parameters, in words."""
     if config.model.head == "mixture":
         return "negative log-likelihood, nats"
     where = "all six outputs" if config.train.parameter_loss == "paper" else "those issued"

@@ -154,7 +154,7 @@ def rank(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
 
 
 def with_settings(config: Config, settings: dict[str, Any]) -> Config:
-    """Return a config with single values replaced.
+    """A config with single values replaced.
 
     Raises:
         UsageError: naming all that is wrong.

@@ -143,14 +143,14 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
     config, folder = task
     weights = parameter_count(Clone(config.model))
 
-    def report(record: dict[str, Any]) -> None:
+    def send(record: dict[str, Any]) -> None:
         connection.send(Epoch(record, weights))
         if connection.recv():
             raise _PrunedError
 
-    def on_progress(progress: loop.Progress) -> None:
+    def report(progress: loop.Progress) -> None:
         if progress.record is not None:
-            report(progress.record)
+            send(progress.record)
 
     resume, left = is_run(folder), config.train.max_minutes
     try:
@@ -158,7 +158,7 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
             run = open_run(folder)
             history = run.history()
             for record in history:
-                report(record)
+                send(record)
             # Another number of threads would round otherwise than in the epochs before.
             config = with_settings(config, {"train.threads": run.config.train.threads})
             minutes = [record["seconds"] / 60 for record in history]
@@ -167,7 +167,7 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
                 if left < np.mean(minutes):
                     return Ended(Status.FINISHED, None)
         now = with_settings(config, {"train.max_minutes": left})
-        loop.train(now, dataset, folder, resume=resume, on_progress=on_progress)
+        loop.train(now, dataset, folder, resume=resume, on_progress=report)
     except _PrunedError:
         return Ended(Status.PRUNED, None)
     if now != config:

@@ -11,7 +11,7 @@ from teamclone.errors import choose
 
 
 def value_of(text: str) -> Any:
-    """Return the value of a text in TOML's notation; any other text is a word."""
+    """A value as TOML writes it; anything else is a word."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -19,7 +19,7 @@ def value_of(text: str) -> Any:
 
 
 def fill(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any:
-    """Return a dataclass from a TOML table; a wrong entry is left out and added to ``problems``."""
+    """A dataclass from a TOML table; what does not fit is left out and told."""
     if not isinstance(table, dict):
         problems.append(f"{key}: expected a table, got {table!r}")
         table = {}
@@ -56,7 +56,7 @@ def fill(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any:
 
 
 def entries(table: Any, key: str, kind: type, problems: list[str]) -> dict[str, Any]:
-    """Return a table whose keys are free; a wrong entry is left out and added to ``problems``."""
+    """A table whose names are free."""
     if not isinstance(table, dict):
         problems.append(f"{key}: expected a table, got {table!r}")
         return {}

@@ -1,6 +1,6 @@
 """Each formula of the server, once: elementwise over NumPy arrays, PyTorch tensors or plain numbers.
 
-Lengths in metres, velocities in metres per cycle, angles in radians unless a name says ``_deg``. Parameters of the
+Lengths in metres, velocities in metres per cycle, angles in radians unless a name ends in ``_deg``. Parameters of the
 server and of player types are arguments, so that a match is computed by its own. Sources name the files of rcssserver.
 
 The planner's compiled kernels need scalar forms of some of these; `tests/unit/planner/test_formulas.py` holds the two

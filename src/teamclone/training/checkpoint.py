@@ -72,4 +72,4 @@ def _put(path: Path, model: nn.Module, tensors: dict[str, torch.Tensor]) -> None
     try:
         model.load_state_dict(tensors)
     except RuntimeError as error:
-        raise RunError(f"{path}: of another model than config.toml says ({' '.join(str(error).split())})") from None
+        raise RunError(f"{path}: of another model than that of config.toml ({' '.join(str(error).split())})") from None

@@ -31,7 +31,7 @@ DOUBT_SHARE, DOUBT_M = 0.02, 0.5
 class ActorView:
     """A batch of samples as their actors see them. Quantities of a single block are computed there.
 
-    Attributes, (batch, ...) unless said otherwise:
+    Attributes, (batch, ...) unless noted otherwise:
         ball: (batch, 4). me: channels of the actor. my_type: fields of the actor's type. server: server fields.
         axes: the actor's. body: radians.
         players: (batch, 22, channels); position, motion: (batch, 22, 2) of them; flags: (batch, 22) int64.

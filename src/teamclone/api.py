@@ -1,4 +1,4 @@
-"""What ``import teamclone`` offers beside the functions of the rooms themselves: a clone that is ready to predict."""
+"""The objects that ``import teamclone`` offers beside the packages' functions: a clone that is ready to predict."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class LoadedClone:
 
         Args:
             match: a match; the path of its game log, beside which the command log is found; or, with ``store``, the id
-                of a match of it. Without a command log the columns of what was done are null.
+                of a match of it. Without a command log the columns of the true commands are null.
             team: name of the team, the modelled one or any other. side: "left" or "right", in its place.
             store: where ``match`` is an id.
             unums: uniform numbers to predict, 1 to 11; None for all.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 class TeamcloneError(Exception):
-    """Something the user can act on. Its text is one line: what was expected, what was got, where, what to do."""
+    """An error that the user can act on. Its text is one line: what was expected, what was got, where, what to do."""
 
 
 class UsageError(TeamcloneError):
@@ -42,7 +42,7 @@ class LogError(TeamcloneError):
 def place(
     *, path: Path | str | None = None, line: int | None = None, byte: int | None = None, cycle: int | None = None
 ) -> str:
-    """Where something is, as the prefix of a message: ``match.rcg.gz: line 12: cycle 57: ``."""
+    """Return a place as the prefix of a message: ``match.rcg.gz: line 12: cycle 57: ``."""
     parts = [] if path is None else [str(path)]
     for name, value in (("line", line), ("byte", byte), ("cycle", cycle)):
         if value is not None:
@@ -71,7 +71,7 @@ class RunError(TeamcloneError):
 
 
 def choose(wrong: str, choices: Iterable[str]) -> str:
-    """The remedy for a name that is none: ``did you mean a or b?``, or all choices where none is near."""
+    """Return the remedy for an unknown name: ``did you mean a or b?``, or all choices where none is near."""
     known = list(choices)
     if not known:
         return "there is none"

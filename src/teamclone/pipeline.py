@@ -1,4 +1,4 @@
-"""From one schedule to the report: play, store, dataset, train, evaluate. What is there and still fits is kept."""
+"""From one schedule to the report: play, store, dataset, train, evaluate. Finished stages that still fit are kept."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoreSettings:
-    """``location``: a folder or ``postgresql://...``; a folder of its own beside the matches unless given."""
+    """``location``: a folder or ``postgresql://...``; empty for a folder beside the matches."""
 
     location: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainSettings:
-    """A preset and what to change in it: ``"train.epochs=10"``."""
+    """A preset and changes to it: ``"train.epochs=10"``."""
 
     preset: str = "best"
     set: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ class Pipeline:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageResult:
-    """What a stage came to: ``done`` is False where all of it was there already."""
+    """The result of a stage: ``done`` is False where all of it was there already."""
 
     stage: Stage
     done: bool
@@ -84,14 +84,14 @@ class StageResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """What is called while it goes on: with the steps of a stage, the records of matches, the progress of training."""
+    """The callbacks of a pipeline: for the steps of a stage, the records of matches, the progress of training."""
 
     on_progress: Callable[[Stage, int, int], None] = lambda stage, done, total: None
     on_record: Callable[[Record], None] = lambda record: None
     on_training: Callable[[Progress], None] = lambda progress: None
 
     def steps(self, stage: Stage) -> Callable[[int, int], None]:
-        """Return what a stage calls with how many of its steps are done, and how many there are."""
+        """Return a stage's callback, for the steps that are done and their number."""
         return lambda done, total: self.on_progress(stage, done, total)
 
 
@@ -99,7 +99,7 @@ def load_pipeline(path: Path) -> Pipeline:
     """Read a schedule with its sections ``store``, ``dataset``, ``train`` and ``evaluate``.
 
     Raises:
-        UsageError: naming what is wrong, in one line.
+        UsageError: naming all mistakes, in one line.
     """
     table = read_schedule(path)
     schedule = schedule_from(table, where=str(path), base=folder_of(path))
@@ -146,25 +146,26 @@ def run_pipeline(
     jobs: int | None = None,
     watch: Watch = Watch(),
 ) -> tuple[PlayReport, list[StageResult]]:
-    """Do what is missing, stage by stage. Stopped or killed, the next call goes on where this one was.
+    """Do the missing work, stage by stage. Stopped or killed, the next call resumes it.
 
     Args:
-        out: where the matches go, as in `play.runner.play`; store, dataset and run lie beside them.
+        pipeline: the schedule with its sections, see `load_pipeline`.
+        out: the folder for the matches, see `play.runner.play`; store, dataset and run lie beside them.
         executor: where matches are played and cleaned; None is this machine.
         jobs: how many at once, as in `play.runner.play`.
-        watch: called while it goes on.
+        watch: called during the work.
 
     Returns:
-        What became of the matches, and of each stage that there was.
+        The report on the matches, and the result of each stage that there was.
 
     Raises:
-        PlayError: as `play.runner.play` does, or no match at all is complete.
-        TeamcloneError: a stage failed; what the stages before made stays.
+        PlayError: see `play.runner.play`; or no match at all is complete.
+        TeamcloneError: a stage failed; the results of earlier stages stay.
     """
     results: list[StageResult] = []
     started = time.monotonic()
 
-    def tell(stage: Stage, text: str, *, done: bool) -> None:
+    def report_stage(stage: Stage, text: str, *, done: bool) -> None:
         nonlocal started
         now = time.monotonic()
         results.append(StageResult(stage=stage, done=done, seconds=now - started, text=text))
@@ -185,7 +186,7 @@ def run_pipeline(
     )
     complete = len(report.records) - len(report.failed)
     text = f"{complete} matches in {store.location}, {len(report.failed)} failed"
-    tell(Stage.PLAY, text, done=report.played > 0)
+    report_stage(Stage.PLAY, text, done=report.played > 0)
     if not complete:
         raise PlayError(f"{out}: no match of the schedule is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]
     if pipeline.dataset is None:
@@ -203,21 +204,21 @@ def run_pipeline(
             replace=folder.exists(),
             on_progress=watch.steps(Stage.DATASET),
         )
-    tell(Stage.DATASET, f"{open_dataset(folder).meta['n_samples']:,} samples in {folder}", done=not current)
+    report_stage(Stage.DATASET, f"{open_dataset(folder).meta['n_samples']:,} samples in {folder}", done=not current)
     if pipeline.train is None:
         return report, results
 
     run, trained = _train(pipeline.train, folder, out / RUN, watch)
-    tell(Stage.TRAIN, f"{len(run.history())} epochs in {run.path}", done=trained)
+    report_stage(Stage.TRAIN, f"{len(run.history())} epochs in {run.path}", done=trained)
     evaluated = _evaluate(run, pipeline.checkpoint, watch)
-    tell(Stage.EVALUATE, f"{run.path}/evaluation.json", done=evaluated)
+    report_stage(Stage.EVALUATE, f"{run.path}/evaluation.json", done=evaluated)
     page, written = _report(run, watch, anew=evaluated)
-    tell(Stage.REPORT, str(page), done=written)
+    report_stage(Stage.REPORT, str(page), done=written)
     return report, results
 
 
 def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> tuple[Run, bool]:
-    """Train, or go on with it: the run, and whether there was anything to do."""
+    """Train, or resume; return the run, and whether there was anything to do."""
     dataset = open_dataset(dataset_folder)
     resume = False
     if is_run(folder):
@@ -233,7 +234,7 @@ def _train(config: Config, dataset_folder: Path, folder: Path, watch: Watch) -> 
 
 
 def _evaluate(run: Run, checkpoint: str, watch: Watch) -> bool:
-    """Evaluate these weights; whether there was anything to do."""
+    """Evaluate these weights; return whether there was anything to do."""
     evaluation = fresh_evaluation(run)
     if evaluation is not None and evaluation["run"]["checkpoint"] == checkpoint:
         return False
@@ -242,7 +243,10 @@ def _evaluate(run: Run, checkpoint: str, watch: Watch) -> bool:
 
 
 def _report(run: Run, watch: Watch, *, anew: bool) -> tuple[Path, bool]:
-    """Write the report unless one is younger than the evaluation: its page, and whether there was anything to do."""
+    """Write the report unless one is younger than the evaluation.
+
+    Returns its page, and whether there was anything to do.
+    """
     page = run.path / "report.html"
     evaluated_ns = (run.path / "evaluation.json").stat().st_mtime_ns
     if not anew and page.exists() and page.stat().st_mtime_ns >= evaluated_ns:

@@ -180,7 +180,7 @@ def test_info(logs: Path, samples_dir: Path, tmp_path: Path) -> None:
 def test_info_for_people(fixtures_dir: Path) -> None:
     text = run("info", fixtures_dir / "nan", fixtures_dir / "onesided").stdout
     assert "HELIOS_base 0 : 0 YuShan2024" in text
-    assert "HELIOS_base 0 : 0 nobody" in text
+    assert "HELIOS_base 0 : 0 no team" in text
     assert "refused by the server's parser" in text
     assert "no right team connected" in text
 

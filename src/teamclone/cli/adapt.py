@@ -18,7 +18,7 @@ def adapt(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Adapt a trained clone to another team, from a few of its matches. What is made is a run as any other."""
+    """Adapt a trained clone to another team, from a few of its matches. The result is a run like any other."""
     from teamclone.cli.train import run_training
     from teamclone.training.adapt import adaptation
     from teamclone.training.run import open_run

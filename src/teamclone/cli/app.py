@@ -73,6 +73,7 @@ app.command("run", hidden=True)(pipeline.run)
 
 @app.callback(invoke_without_command=True)
 def root(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+    """Set up logging to a terminal and answer ``--version``."""
     if sys.stderr.isatty():
         handler = logging.StreamHandler()
         handler.setFormatter(logging.Formatter("teamclone: %(message)s"))

@@ -1,4 +1,4 @@
-"""What every command shares: tables, JSON, progress, failing."""
+"""Parts that all commands share: tables, JSON, progress, errors."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ E = TypeVar("E", bound=StrEnum)
 
 
 def fail(text: str, *, code: int) -> NoReturn:
-    """Say one line on stderr and exit."""
+    """Print one line on stderr and exit."""
     print(f"teamclone: {' '.join(text.splitlines())}", file=sys.stderr)
     raise SystemExit(code)
 
 
 def print_json(value: Any) -> None:
-    """One JSON document on stdout; NaN becomes null, so that every reader takes it."""
+    """Print one JSON document on stdout; NaN becomes null, so that every reader takes it."""
     print(json.dumps(_finite(value), ensure_ascii=False, indent=2, default=str))
 
 
@@ -43,7 +43,7 @@ def _finite(value: Any) -> Any:
 def print_table(
     headers: Sequence[str], rows: Iterable[Sequence[object]], *, title: str | None = None, numeric: Iterable[int] = ()
 ) -> None:
-    """A table on stdout; ``numeric`` names the columns to align right."""
+    """Print a table on stdout; ``numeric`` names the columns to align right."""
     right = set(numeric)
     table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="bold")
     for index, header in enumerate(headers):
@@ -55,7 +55,7 @@ def print_table(
 
 
 def progress(what: str) -> Progress:
-    """A progress bar on stderr; silent without a terminal."""
+    """Return a progress bar on stderr; silent without a terminal."""
     console = Console(stderr=True)
     return Progress(
         TextColumn(what),
@@ -74,7 +74,7 @@ def values_of(settings: Iterable[str]) -> dict[str, Any]:
 
 
 def choice(kind: type[E], value: str, *, option: str) -> E:
-    """A member of a StrEnum by its value; a usage error that lists the choices where there is none."""
+    """Return a member of a StrEnum by its value; a usage error that lists the choices where there is none."""
     try:
         return kind(value)
     except ValueError:

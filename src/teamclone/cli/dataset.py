@@ -18,15 +18,15 @@ def dataset(
     out: Annotated[Path, typer.Option(help="The folder to write.")],
     unseen: Annotated[list[str] | None, typer.Option(help="An opponent to keep out of training; repeatable.")] = None,
     split: Annotated[str, typer.Option(help="match: whole matches; rows: the paper's, which leaks.")] = "match",
-    commands: Annotated[str, typer.Option(help="executed: what the server did; received: also refused ones.")] = (
-        "executed"
-    ),
+    commands: Annotated[
+        str, typer.Option(help="executed: those that the server carried out; received: also refused ones.")
+    ] = ("executed"),
     turn_zero: Annotated[str, typer.Option(help="keep or drop (turn 0), which means doing nothing.")] = "keep",
     train_goalkeepers: Annotated[
         bool, typer.Option("--train-goalkeepers", help="Train on goalkeepers' commands, too; never test on them.")
     ] = False,
     goalkeepers: Annotated[
-        bool, typer.Option("--goalkeepers", help="Model goalkeepers as everybody else, and catch as a command.")
+        bool, typer.Option("--goalkeepers", help="Model goalkeepers like the other players, and catch as a command.")
     ] = False,
     set_plays: Annotated[
         bool, typer.Option("--set-plays", help="Take all play modes, not only play_on, and move as a command.")
@@ -39,7 +39,9 @@ def dataset(
     test_match: Annotated[
         list[str] | None, typer.Option(help="Match id or part of a log name that must be a test match; repeatable.")
     ] = None,
-    validation_match: Annotated[list[str] | None, typer.Option(help="The same for validation; repeatable.")] = None,
+    validation_match: Annotated[
+        list[str] | None, typer.Option(help="As --test-match, for validation; repeatable.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
     scheduler: Annotated[

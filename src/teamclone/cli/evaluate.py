@@ -19,7 +19,7 @@ def evaluate(
     seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """Say how good a clone is: on test matches, against unseen opponents, and beside rules without a network."""
+    """Measure how good a clone is: on test matches, on unseen opponents, and beside rules without a network."""
     from teamclone.evaluation.evaluate import evaluate_and_save
     from teamclone.training.run import open_run
 
@@ -56,7 +56,7 @@ def print_summary(evaluation: dict[str, Any]) -> None:
 
 
 def _print_splits(splits: dict[str, Any]) -> None:
-    """Print the figures of every split beside those of the baselines, and what limits them."""
+    """Print the figures of every split beside those of the baselines, and their limits."""
     from teamclone.evaluation.bootstrap import FEW_MATCHES
 
     figures = (("accuracy", "accuracy", 3), ("cross_entropy", "CE, nats", 3), ("ece", "ECE", 3), ("brier", "Brier", 3))

@@ -16,7 +16,7 @@ def info(
     files: Annotated[list[Path], typer.Argument(help="Logs (.rcg, .rcl, also .gz, .xz, .zst) or folders of them.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a match, each on a line.")] = False,
 ) -> None:
-    """Say what match logs hold: teams, score, versions, cycles, commands, and what is odd."""
+    """Show the contents of match logs: teams, score, versions, cycles, commands, and anything odd."""
     import sys
 
     from teamclone.errors import LogError
@@ -38,7 +38,7 @@ def info(
 
 
 def summary(match: Match) -> dict[str, Any]:
-    """What ``info --json`` prints of a match."""
+    """Return the object that ``info --json`` prints of a match."""
     import numpy as np
 
     from teamclone.rcss.commands import CommandKind
@@ -76,7 +76,7 @@ def summary(match: Match) -> dict[str, Any]:
 
 
 def problem_json(problem: Problem) -> dict[str, Any]:
-    """A problem as ``info --json`` and ``validate --json`` print it."""
+    """Return a problem as ``info --json`` and ``validate --json`` print it."""
     return {
         "code": problem.code,
         "severity": str(problem.severity),
@@ -89,12 +89,12 @@ def problem_json(problem: Problem) -> dict[str, Any]:
 
 
 def printable(path: Path | None) -> str | None:
-    """A path as text that every terminal and JSON reader takes, whatever bytes are in it."""
+    """Return a path as text that every terminal and JSON reader takes, whatever bytes are in it."""
     return None if path is None else str(path).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def as_text(found: dict[str, Any]) -> str:
-    """A summary for people."""
+    """Return a summary for people."""
     left, right = found["left"], found["right"]
     penalties = any(team["penalties_scored"] or team["penalties_missed"] for team in (left, right))
     shoot_out = f" (penalties {left['penalties_scored']} : {right['penalties_scored']})" if penalties else ""
@@ -103,7 +103,7 @@ def as_text(found: dict[str, Any]) -> str:
     ranked = sorted(found["commands"].items(), key=lambda item: -item[1])
     lines = [
         found["path"],
-        f"  {left['name'] or 'nobody'} {left['score']} : {right['score']} {right['name'] or 'nobody'}{shoot_out}",
+        f"  {left['name'] or 'no team'} {left['score']} : {right['score']} {right['name'] or 'no team'}{shoot_out}",
         f"  log version {found['log_version']}{server}{'' if found['complete'] else ', not closed by the server'}",
         f"  {found['frames']} frames{cycles}, {found['play_on_frames']} in play_on",
         f"  {sum(found['commands'].values())} commands of players"

@@ -42,7 +42,7 @@ def matches(
 
 
 def score(row: dict[str, int]) -> str:
-    """``2 : 1``, with the penalties of a shoot-out in brackets: ``0 (3) : 0 (4)``."""
+    """Return a score, ``2 : 1``, with the penalties of a shoot-out in brackets: ``0 (3) : 0 (4)``."""
     penalties = any(row[f"{side}_penalties_{what}"] for side in ("left", "right") for what in ("scored", "missed"))
     return " : ".join(
         f"{row[f'{side}_score']} ({row[f'{side}_penalties_scored']})" if penalties else f"{row[f'{side}_score']}"

@@ -11,7 +11,7 @@ import typer
 
 
 def pipeline(
-    schedule: Annotated[Path, typer.Argument(help="Schedule (TOML): what to play, and what to make of it.")],
+    schedule: Annotated[Path, typer.Argument(help="Schedule (TOML): matches to play, settings of the stages.")],
     out: Annotated[
         Path, typer.Option("--out", help="Folder for all that is made; one that was begun is gone on with.")
     ],
@@ -21,9 +21,9 @@ def pipeline(
     scheduler: Annotated[
         str | None, typer.Option(help="Play and clean on the Dask cluster of this scheduler: tcp://host:port.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what became of each stage and match as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result of each stage and match as JSON.")] = False,
 ) -> None:
-    """Play, store, make the dataset, train, evaluate and report. What is there already is kept."""
+    """Play, store, make the dataset, train, evaluate and report. Finished parts are kept."""
     from teamclone.cli.common import print_json, print_table, progress
     from teamclone.cli.play import line_of
     from teamclone.cli.train import reporter
@@ -73,6 +73,6 @@ def pipeline(
 
 @wraps(pipeline)
 def run(**options: Any) -> None:
-    """`pipeline` by the name that it had before."""
+    """Run `pipeline` by the name that it had before."""
     print("teamclone: run is now called pipeline; call teamclone pipeline instead", file=sys.stderr)
     pipeline(**options)

@@ -44,7 +44,7 @@ def play(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> None:
-    """Play matches on rcssserver, unattended. Given again, the same command plays what is missing."""
+    """Play matches on rcssserver, unattended. Given again, the command plays the missing ones."""
     from teamclone.cli.common import print_json, progress, values_of
     from teamclone.errors import UsageError
     from teamclone.play.runner import play as run
@@ -57,7 +57,7 @@ def play(
     if schedule is not None:
         if server or options or matches != 1:
             raise UsageError(
-                "--server, --set and --matches go with --left and --right; a schedule says all that itself"
+                "--server, --set and --matches go with --left and --right; a schedule has these settings itself"
             )
         asked = load_schedule(schedule)
     else:
@@ -69,7 +69,7 @@ def play(
     with executor_of(scheduler, jobs=jobs) as executor, progress("play") as bar:
         task = bar.add_task("", total=len(asked.fixtures))
 
-        def tell(record: Record) -> None:
+        def show(record: Record) -> None:
             count = f"{int(bar.tasks[task].completed) + 1} of {len(asked.fixtures)}"
             bar.console.print(f"{count}: {line_of(record)}", markup=False, highlight=False, soft_wrap=True)
 
@@ -81,7 +81,7 @@ def play(
             jobs=jobs,
             retry_failed=retry_failed,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
-            on_record=tell,
+            on_record=show,
         )
     if as_json:
         print_json(report.to_json())
@@ -92,7 +92,7 @@ def play(
 
 
 def line_of(record: Record) -> str:
-    """Say in a line what became of a match."""
+    """Return a line about the outcome of a match."""
     if record.trouble is not None:
         return f"{record.id}: failed after {record.attempt} attempts: {record.trouble.fault}: {record.trouble.text}"
     left, right = record.left, record.right
@@ -100,7 +100,7 @@ def line_of(record: Record) -> str:
 
 
 def print_report(report: PlayReport) -> None:
-    """Print pairings with what became of their matches, then the failed ones."""
+    """Print pairings with the outcomes of their matches, then the failed ones."""
     from teamclone.cli.common import print_table
 
     pairings: dict[tuple[str, str], list[Record]] = {}

@@ -22,7 +22,7 @@ def predict(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> None:
-    """Predict what a team does in matches: a row for each player and cycle. Exit code 1 if a log failed."""
+    """Predict the commands of a team in matches: a row for each player and cycle. Exit code 1 if a log failed."""
     from dataclasses import asdict
 
     from teamclone.cli.common import fail

@@ -16,7 +16,7 @@ def report(
         Path | None, typer.Option(help="The HTML file to write; RUN/report.html by default.", show_default=False)
     ] = None,
 ) -> None:
-    """Write one HTML page about a clone: tables, figures, words. Evaluates first what was not evaluated yet."""
+    """Write one HTML page about a clone: tables, figures, words. Evaluates the clone first where needed."""
     from teamclone.evaluation.report import make_report
     from teamclone.training.run import open_run
 

@@ -30,7 +30,7 @@ def search(
     jobs: Annotated[int, typer.Option(min=1, help="Processes that train at a time.")] = 1,
     beam: Annotated[
         int | None,
-        typer.Option(min=1, help="beam: architectures that a step goes on from; default 3.", show_default=False),
+        typer.Option(min=1, help="beam: architectures kept after each step; default 3.", show_default=False),
     ] = None,
     iterations: Annotated[
         int | None, typer.Option(min=0, help="beam: steps after the first; default 5.", show_default=False)
@@ -53,7 +53,7 @@ def search(
     """Train many times to find settings: layers, the rest by Optuna, or optimisers compared. Give it again to go on."""
     from teamclone.training.config import load_config
 
-    # Before PyTorch is imported: a wrong setting is told at once.
+    # Before PyTorch is imported, so that a wrong setting is reported at once.
     base = load_config(preset, overrides or [])
 
     from teamclone.dataset.reader import open_dataset
@@ -116,7 +116,7 @@ def _settled(search: Search) -> list[Trial]:
 
 
 def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
-    """Progress as a bar, one step a trial; of a beam search the trials of the next step are not known yet."""
+    """Show progress as a bar, one step a trial; the trials of a beam search's next step are not known yet."""
 
     def report(search: Search) -> None:
         from teamclone.search.trials import Mode, Status
@@ -131,17 +131,17 @@ def _bar(task: int, update: Callable[..., None]) -> Callable[[Search], None]:
 
 
 def _lines() -> Callable[[Search], None]:
-    """Progress as lines for a log: one for every trial that ended."""
-    told: set[str] | None = None
+    """Show progress as lines for a log: one for every trial that ended."""
+    reported: set[str] | None = None
 
     def report(search: Search) -> None:
-        nonlocal told
+        nonlocal reported
         settled = _settled(search)
-        if told is None:  # nothing has ended yet but in earlier calls
-            told = {trial.name for trial in settled}
+        if reported is None:  # nothing has ended yet but in earlier calls
+            reported = {trial.name for trial in settled}
         for trial in settled:
-            if trial.name not in told:
-                told.add(trial.name)
+            if trial.name not in reported:
+                reported.add(trial.name)
                 print(f"{trial.name}: {_line(trial)}", file=sys.stderr, flush=True)
 
     return report
@@ -186,7 +186,7 @@ def _summary(search: Search, *, as_json: bool) -> None:
 
 
 def _settings(trial: Trial) -> str:
-    """``learning_rate 0.0021, dropout 0.1``."""
+    """Return settings as text: ``learning_rate 0.0021, dropout 0.1``."""
 
     def text(value: Any) -> str:
         return f"{value:.3g}" if isinstance(value, float) else str(value)

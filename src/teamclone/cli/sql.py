@@ -39,7 +39,7 @@ def sql(
 
 
 def values(rows: QueryRows) -> Iterator[list[Any]]:
-    """The rows as Python values that JSON and CSV have."""
+    """Yield the rows as Python values that JSON and CSV have."""
     import pyarrow as pa
 
     for batch in rows.batches:
@@ -53,7 +53,10 @@ def values(rows: QueryRows) -> Iterator[list[Any]]:
 
 
 def plain(value: Any) -> Any:
-    """Decimals (the type of a sum of integers) as numbers, times and other types as text, not-a-number as None."""
+    """Return a value of a row as JSON and CSV have it.
+
+    Decimals (the type of a sum of integers) become numbers, times and other types text, not-a-number None.
+    """
     from decimal import Decimal
 
     if isinstance(value, float):
@@ -70,7 +73,7 @@ def plain(value: Any) -> Any:
 
 
 def print_csv(rows: QueryRows) -> None:
-    """CSV with a header; NULL is empty, a list or structure is JSON."""
+    """Print CSV with a header; NULL is empty, a list or structure is JSON."""
     import csv
 
     writer = csv.writer(sys.stdout, lineterminator="\n")
@@ -80,7 +83,7 @@ def print_csv(rows: QueryRows) -> None:
 
 
 def print_objects(rows: QueryRows) -> None:
-    """A JSON list, an object a line, written as the rows come."""
+    """Print a JSON list, an object a line, written as the rows come."""
     names, before = rows.schema.names, "["
     for row in values(rows):
         print(before + json.dumps(dict(zip(names, row, strict=True)), ensure_ascii=False), end="")
@@ -89,7 +92,7 @@ def print_objects(rows: QueryRows) -> None:
 
 
 def print_rows(rows: QueryRows) -> None:
-    """A table of the first rows, and on stderr a line about the others."""
+    """Print a table of the first rows, and on stderr a line about the others."""
     from itertools import islice
 
     import pyarrow as pa

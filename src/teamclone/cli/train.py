@@ -55,7 +55,7 @@ def train(
         from teamclone.training.run import open_run
 
         config = override(open_run(out).config, overrides or [])
-    else:  # Before PyTorch is imported: a wrong setting is told at once.
+    else:  # Before PyTorch is imported, so that a wrong setting is reported at once.
         config = load_config(preset or "best", overrides or [])
     run_training(config, dataset, out, resume=resume, as_json=as_json)
 
@@ -85,7 +85,7 @@ def run_training(
 
 
 def _in_silence(work: Callable[[], object]) -> None:
-    """Work as one of several processes, of which another one speaks for all."""
+    """Train without output, as one of several processes of which another reports."""
     try:
         work()
     except TeamcloneError:
@@ -95,12 +95,12 @@ def _in_silence(work: Callable[[], object]) -> None:
 
 
 def reporter(bar: Bar, task: TaskID) -> Callable[[Progress], None]:
-    """Shows the progress of a training: on the bar, or as lines where there is no terminal."""
+    """Return a function that shows the progress of a training: a bar, or lines where there is no terminal."""
     return _lines() if bar.disable else _bar(task, bar.update)
 
 
 def _bar(task: TaskID, update: Callable[..., None]) -> Callable[[Progress], None]:
-    """Progress as a bar, one step a batch."""
+    """Show progress as a bar, one step a batch."""
     text = ""
 
     def report(at: Progress) -> None:
@@ -121,16 +121,16 @@ def _bar(task: TaskID, update: Callable[..., None]) -> Callable[[Progress], None
 
 
 def _lines() -> Callable[[Progress], None]:
-    """Progress as lines for a log: one for every tenth of the epochs, and at least one a minute."""
-    told = float("-inf")
+    """Show progress as lines for a log: one for every tenth of the epochs, and at least one a minute."""
+    reported_at = float("-inf")
 
     def report(at: Progress) -> None:
-        nonlocal told
+        nonlocal reported_at
         if not at.epoch:
             return
         now, tenths = time.monotonic(), 10 * at.epoch // at.epochs - 10 * (at.epoch - 1) // at.epochs
-        if at.record is not None and (tenths or now - told > 60):
-            told = now
+        if at.record is not None and (tenths or now - reported_at > 60):
+            reported_at = now
             print(f"epoch {at.epoch}/{at.epochs}: {_line(at)}", file=sys.stderr, flush=True)
 
     return report

@@ -55,7 +55,10 @@ def validate(
 
 
 def line(checked: MatchCheck) -> str:
-    """``ok     match.rcg.gz: 5999 frames, 700123 commands`` or ``wrong  ...`` with the first thing that is wrong."""
+    """Return a line about a match.
+
+    ``ok     match.rcg.gz: 5999 frames, 700123 commands`` or ``wrong  ...`` with the first problem.
+    """
     if not checked.wrong:
         return f"ok     {checked.name}: {checked.frames} frames, {checked.commands} commands"
     first, *more = checked.wrong
@@ -65,7 +68,7 @@ def line(checked: MatchCheck) -> str:
 
 
 def as_object(checked: MatchCheck) -> dict[str, Any]:
-    """What ``--json`` prints of a match."""
+    """Return the object that ``validate --json`` prints of a match."""
     from teamclone.cli.info import problem_json
 
     return {

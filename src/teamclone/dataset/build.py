@@ -29,7 +29,7 @@ from teamclone.system.workers import Died, run_tasks
 from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS
 
 AHEAD = 64
-"""Cleaned matches that a cluster may hold ready: more than one writer takes from it in a second, in 300 MB."""
+"""Cleaned matches that a cluster may hold ready, about 300 MB: more than one writer takes in a second."""
 
 
 MAX_SHARE = 0.9
@@ -37,7 +37,7 @@ MAX_SHARE = 0.9
 
 
 class SplitBy(StrEnum):
-    """What is kept apart: whole matches, or the paper's rows at random."""
+    """The unit of the split: whole matches, or the paper's rows at random."""
 
     MATCH = "match"
     ROWS = "rows"
@@ -45,7 +45,7 @@ class SplitBy(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DatasetConfig:
-    """What goes into a dataset.
+    """The settings of a dataset.
 
     Attributes:
         teams: the teams to clone, as their logs name them. Each is seen as attacking +x and coming first, so a match of
@@ -56,7 +56,7 @@ class DatasetConfig:
         train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. A team may
             give its goalkeeper another number than usual. A field player then wears the usual one, which a network
             that knows players by their numbers has otherwise never seen.
-        goalkeepers: model goalkeepers as everybody else, in every split, and ``catch`` as a command.
+        goalkeepers: model goalkeepers like the other players, in every split, and ``catch`` as a command.
         set_plays: take the commands of all play modes that have a Situation, not only of play_on, and ``move`` as one.
         idle: take cycles without a body command as samples of ``none``.
         test_matches, validation_matches: match ids or parts of log names that must fall there; the other split
@@ -82,7 +82,7 @@ class DatasetConfig:
 
     @property
     def team(self) -> str:
-        """All teams as one name."""
+        """Name of all teams together."""
         return " + ".join(self.teams)
 
     @property
@@ -92,7 +92,7 @@ class DatasetConfig:
         return tuple(name for name in REPERTOIRE if wanted.get(name, True))
 
     def check(self) -> None:
-        """See that the options go together.
+        """Raise unless the options go together.
 
         Raises:
             UsageError: they do not.
@@ -223,13 +223,12 @@ def _nothing_left(out: Path, config: DatasetConfig, report: dict[str, Any]) -> D
     left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
     return DatasetError(
         f"{out}: no command of {config.team} is left after cleaning ({left}). "
-        "Matches without a command log have none to give, and before log version 3 nothing tells what was "
-        "executed"
+        "Matches without a command log have no commands, and logs before version 3 do not show which were executed"
     )
 
 
 def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict[str, Any]) -> dict[str, Any]:
-    """Return what ``dataset.json`` says beside counts."""
+    """Return the content of ``dataset.json`` beside counts."""
     return {
         "team": config.team,
         **({"teams": config.teams} if len(config.teams) > 1 else {}),
@@ -241,7 +240,7 @@ def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict
 
 
 def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
-    """Whether the dataset in a folder is what ``build_dataset`` would make of the store now."""
+    """Return whether the dataset in a folder equals that which ``build_dataset`` would make of the store now."""
     from teamclone.dataset.reader import open_dataset  # imports PyTorch, which takes longer than to clean many matches
 
     try:
@@ -255,7 +254,7 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
 
 
 def _options(config: DatasetConfig) -> dict[str, Any]:
-    """A config as the dataset keeps it: what is beyond play_on only where it is asked for."""
+    """Return a config as the dataset keeps it: options beyond play_on only where they are on."""
     options = asdict(config)
     teams = options.pop("teams")
     for name in ("goalkeepers", "set_plays", "idle"):
@@ -294,7 +293,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
 
 
 def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
-    """The teams' matches by match id, the left side first, and how many matches are without them."""
+    """Return the teams' matches by match id, the left side first, and how many matches are without them."""
     if not config.teams or len(set(config.teams)) < len(config.teams):
         raise UsageError(f"expected different teams, got {', '.join(config.teams) or 'none'}; name each once")
     entries: list[_Entry] = []
@@ -353,7 +352,7 @@ def _add(writer: DatasetWriter, match: MatchSamples, *, index: int, split: NDArr
 
 
 def _pad_types(types: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """(n_matches, n_types, n_fields); matches with fewer types repeat type 0."""
+    """Return (n_matches, n_types, n_fields) parameters; matches with fewer types repeat type 0."""
     most = max(1, *map(len, types))
     default = np.array([DEFAULTS[name] for name in FIELDS])
     padded = np.empty((len(types), most, len(FIELDS)), np.float32)
@@ -388,7 +387,7 @@ def _by_kind(counts: Iterable[int], repertoire: Sequence[str]) -> dict[str, int]
 def _report(
     config: DatasetConfig, matches: Sequence[dict[str, Any]], *, rows: NDArray[np.int64], without_team: int
 ) -> dict[str, Any]:
-    """The sums over all matches; ``rows`` is (n_splits, n_kinds)."""
+    """Return the sums over all matches; ``rows`` is (n_splits, n_kinds)."""
     return {
         "team": config.team,
         "matches_without_team": without_team,

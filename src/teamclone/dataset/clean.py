@@ -28,20 +28,20 @@ _CATEGORICAL = slice(_MEASURED.stop, None)
 """Channels of ``World.players``."""
 
 COMMAND_COLUMNS = ("frame", "side", "unum", "kind", "legs", "valid", "arg0", "arg1", "arg2", "arg3")
-"""What cleaning needs of a match's commands; of its frames and players it needs what `world.view` does."""
+"""Columns of a match's commands that cleaning needs; of its frames and players it needs those of `world.view`."""
 
 
 class Commands(StrEnum):
     """Which commands become samples."""
 
     EXECUTED = "executed"
-    """Those whose counter rose: what the player did."""
+    """Commands whose counter rose: what the server executed."""
     RECEIVED = "received"
-    """The first of each cycle, also where the server refused it: what the player wanted."""
+    """The first command of each cycle, also where the server refused it: what the player intended."""
 
 
 class TurnZero(StrEnum):
-    """What becomes of ``(turn 0)``, by which many agents say that they do nothing."""
+    """The treatment of ``(turn 0)``, which many agents send for doing nothing."""
 
     KEEP = "keep"
     DROP = "drop"
@@ -49,7 +49,7 @@ class TurnZero(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """A cleaning step: how many commands it was given and how many it let through."""
+    """A cleaning step: the number of commands before and after it."""
 
     name: str
     before: int
@@ -99,18 +99,18 @@ def clean_match(
         server_params: ranges of the arguments; the server's defaults where one is missing.
         side: the modelled team's, 1 left or -1 right.
         goalkeepers: keep the goalkeeper's commands, too.
-        repertoire: the commands to keep, some of REPERTOIRE. With catch the goalkeeper is modelled as everybody is;
+        repertoire: the commands to keep, some of REPERTOIRE. With catch goalkeepers are modelled like other players;
             with move every play mode of a Situation is taken, not only play_on; with none a cycle without a body
             command is a sample.
     """
-    everybody = "catch" in repertoire
+    everyone = "catch" in repertoire
     in_play = frames_in_play(frames, repertoire)
     where = "in play_on or around a set play" if "move" in repertoire else "in play_on"
     goalie = (players["state"] & state_bits.GOALIE) != 0
     slots = slot_of(commands["side"], commands["unum"])
-    of_field = None if everybody or goalkeepers else ~goalie
+    of_field = None if everyone or goalkeepers else ~goalie
     chain = _Chain(commands)
-    _bind(chain, frames, slots, side=side, in_play=in_play, where=where, of_field=of_field, everybody=everybody)
+    _bind(chain, frames, slots, side=side, in_play=in_play, where=where, of_field=of_field, everyone=everyone)
     has_command = np.zeros_like(goalie)
     has_command[commands["frame"][chain.rows], slots[chain.rows]] = True
     kinds = [CommandKind[name.upper()] for name in repertoire if name != "none"]
@@ -169,7 +169,7 @@ def frames_in_play(frames: Columns, repertoire: tuple[str, ...]) -> NDArray[np.b
 def players_to_model(
     frames: Columns, players: Columns, *, side: int, repertoire: tuple[str, ...], goalkeepers: bool = False
 ) -> NDArray[np.bool_]:
-    """Return (n_frames, 11) which players of a team a model of these commands applies to, and when.
+    """Return (n_frames, 11) for which players of a team, and when, a model of these commands applies.
 
     Players on the field in `frames_in_play`; goalkeepers among them with catch, or where ``goalkeepers`` asks for them.
     """
@@ -182,7 +182,7 @@ def players_to_model(
 
 
 class _Chain:
-    """Commands that the cleaning steps so far have kept, and what each step did.
+    """Commands that the cleaning steps so far have kept, and the counts of each step.
 
     Attributes:
         rows: (n,) indices into the match's commands. rules: every step in order.
@@ -214,12 +214,13 @@ def _bind(
     in_play: NDArray[np.bool_],
     where: str,
     of_field: NDArray[np.bool_] | None,
-    everybody: bool,
+    everyone: bool,
 ) -> None:
     """Keep the commands that took a body slot of a frame in play.
 
     Args:
-        in_play: (n_frames,); ``where`` says it in words. of_field: (n_frames, 22) who is modelled; None for all.
+        in_play: (n_frames,); ``where`` is its name in the report. of_field: (n_frames, 22) the modelled players; None
+            for all.
     """
     chain.keep((chain.column("side") == side) & (chain.column("unum") > 0), "sent by a player of the team")
     chain.keep(np.isin(chain.column("kind"), BODY_KINDS), "body commands")
@@ -227,7 +228,7 @@ def _bind(
     frame = chain.column("frame")
     chain.keep((frame >= 0) & (frame < len(frames["cycle"]) - 1), "bound to a frame that has a successor")
     chain.keep(in_play[chain.column("frame")], where)
-    if not everybody:
+    if not everyone:
         every = np.ones(len(chain.rows), np.bool_)
         chain.keep(
             every if of_field is None else of_field[chain.column("frame"), slots[chain.rows]], "of field players"
@@ -246,7 +247,10 @@ def _with_none(samples: Columns, nothing: NDArray[np.bool_], *, kind: int) -> Co
 
 
 def _nothing(frames: Columns, players: Columns) -> NDArray[np.bool_]:
-    """(n_frames, 22) whether the counters say that a player did nothing: a log that lost commands says so of nobody."""
+    """Return (n_frames, 22) whether the counters show that a player issued no command.
+
+    A log that lost commands shows it of no player.
+    """
     nothing: NDArray[np.bool_] = executed_kind(frames, players) == 0
     nothing &= players[counter_name(CommandKind.DASH)] >= 0
     return nothing
@@ -275,6 +279,6 @@ def _stored(values: NDArray[Any], steps: NDArray[np.float64]) -> NDArray[np.int1
 
 
 def _code(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """A channel as uint8; NaN and what no code can be become layout.NO_CODE."""
+    """Return a channel as uint8; NaN and values that are no code become layout.NO_CODE."""
     known = (values >= 0) & (values < layout.NO_CODE)
     return np.where(known, values, layout.NO_CODE).astype(np.uint8)

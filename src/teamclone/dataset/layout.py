@@ -24,7 +24,7 @@ FORMAT = 3
 
 
 class Split(IntEnum):
-    """What a sample is for; the value of the ``split`` array."""
+    """The use of a sample; the value of the ``split`` array."""
 
     TRAIN = 0
     VALIDATION = 1

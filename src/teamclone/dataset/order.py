@@ -17,7 +17,7 @@ def epoch_order(
     draws: NDArray[np.floating] | None = None,
     repeat: bool = False,
 ) -> NDArray[np.int64]:
-    """The rows of one epoch, (rows,), each in 0..n-1 and, without ``draws`` and ``repeat``, at most once.
+    """Return the rows of one epoch, (rows,), each in 0..n-1 and, without ``draws`` and ``repeat``, at most once.
 
     The paper's slices: all rows are shuffled once and cut into slices; each epoch takes the next slice, round robin,
     and shuffles it again. The slices are of equal length (± 1), so that none is a small rest, and as near to
@@ -30,8 +30,8 @@ def epoch_order(
         slice_rows: how long a slice should be.
         draws: (n,) how often each row is to come in a round, on average over the rounds; in one round it comes that
             often rounded down or up. Their sum, rounded, is the number of rows of a round.
-        repeat: of r times fewer rows than a slice should have an epoch takes sqrt(r) rounds, rounded, half way between
-            as many passes and as many steps as with enough of them.
+        repeat: with fewer rows than ``slice_rows`` an epoch makes round(sqrt(slice_rows / rows)) rounds, a compromise
+            between one pass over the rows and as many steps as ``slice_rows`` would take.
     """
     rows = _shuffled(n, seed)
     total = n if draws is None else max(1, round(float(draws.sum(dtype=np.float64))))
@@ -49,12 +49,15 @@ def epoch_order(
 
 
 def epoch_mirrored(n: int, *, seed: int, epoch: int, share: float) -> NDArray[np.bool_]:
-    """(n,) which samples of an epoch's order are shown mirrored: each with probability ``share``."""
+    """Return (n,) whether each sample of an epoch's order is mirrored: each with probability ``share``."""
     return np.random.default_rng((seed, 4, epoch)).random(n) < share
 
 
 def _drawn(rows: NDArray[np.integer], draws: NDArray[np.floating], total: int, *, offset: float) -> NDArray[np.integer]:
-    """``total`` of the rows: a comb with a tooth at ``offset`` and then at every 1 over their draws laid end to end."""
+    """Return ``total`` of the rows by systematic resampling (Kitagawa 1996).
+
+    Row i appears ``draws[i] * total / draws.sum()`` times on average, rounded down or up. ``offset`` is in [0, 1).
+    """
     ends = np.cumsum(draws, dtype=np.float64)
     ends *= total / ends[-1]
     ends[-1] = total
@@ -63,7 +66,7 @@ def _drawn(rows: NDArray[np.integer], draws: NDArray[np.floating], total: int, *
 
 @lru_cache(maxsize=1)
 def _shuffled(n: int, seed: int) -> NDArray[np.integer]:
-    """The shuffle that all epochs share; kept, because 58 million rows take seconds."""
+    """Return the shuffle that all epochs share; kept, because 58 million rows take seconds."""
     rows: NDArray[np.integer] = np.arange(n, dtype=np.int32 if n <= np.iinfo(np.int32).max else np.int64)
     np.random.default_rng((seed, 0)).shuffle(rows)
     rows.setflags(write=False)

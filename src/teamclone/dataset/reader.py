@@ -77,24 +77,24 @@ class Dataset:
 
     @property
     def commands(self) -> tuple[str, ...]:
-        """What its samples may be, some of REPERTOIRE in their order."""
+        """Commands that its samples may have, some of REPERTOIRE in their order."""
         return tuple(self.meta.get("commands", CLONED))
 
     @property
     def matches(self) -> list[dict[str, Any]]:
-        """What is known of each match: ``match_id``, ``opponent``, ``side``, ``split`` and more."""
+        """The matches: ``match_id``, ``opponent``, ``side``, ``split`` and more of each."""
         return list(self.meta["matches"])
 
     @property
     def nbytes(self) -> int:
-        """Size of all arrays."""
+        """Size of all arrays in bytes."""
         return sum(
             array.nbytes
             for array in (*self.frames.values(), *self.samples.values(), self.player_types, self.server_params)
         )
 
     def to(self, device: torch.device) -> Dataset:
-        """The same with all arrays in the memory of a device, where ``rows`` have to lie and answers will."""
+        """Return the dataset with all arrays in the memory of a device, for ``rows`` and answers there."""
         return replace(
             self,
             frames={name: array.to(device) for name, array in self.frames.items()},
@@ -104,11 +104,11 @@ class Dataset:
         )
 
     def split(self, split: Split) -> NDArray[np.int64]:
-        """The samples of a split, ascending."""
+        """Return the samples of a split, ascending."""
         return np.flatnonzero(self.samples["split"].numpy() == int(split))
 
     def need(self, channels: Sequence[str], rows: NDArray[np.int64]) -> None:
-        """See that the frames of these samples hold the ball and these of CHANNEL: not every log has all.
+        """Raise unless the frames of samples hold the ball and some of CHANNEL: not every log has all.
 
         Raises:
             DatasetError: a match lacks one.
@@ -179,7 +179,7 @@ class Dataset:
         return torch.where(turned[self.frames["match"].index_select(0, frame).long()], other, mode)
 
     def _players(self, frame: Tensor) -> Tensor:
-        """(frames, 22, len(CHANNEL)) of some frames."""
+        """Return (frames, 22, len(CHANNEL)) of some frames."""
         stored, codes = (self.frames[name].index_select(0, frame) for name in ("measured", "categorical"))
         players = torch.empty(len(frame), N_PLAYERS, len(CHANNEL), device=frame.device)
         players[..., :2] = self.frames["position"].index_select(0, frame)
@@ -191,7 +191,7 @@ class Dataset:
         return players
 
     def target(self, rows: Rows) -> Target:
-        """What the players did."""
+        """Return the commands of samples."""
         rows = torch.as_tensor(rows)
         return Target(
             kind=self.samples["kind"].index_select(0, rows).long(),
@@ -199,7 +199,7 @@ class Dataset:
         )
 
     def last_kind(self, rows: Rows) -> Tensor:
-        """(batch,) int64: what the acting player executed one cycle before, as an index into `commands`; else -1."""
+        """Return (batch,) int64: the acting player's command one cycle before, an index into `commands`; else -1."""
         rows = torch.as_tensor(rows)
         frame = self.samples["frame"].index_select(0, rows)
         actor = self.samples["player"].index_select(0, rows)
@@ -214,7 +214,7 @@ class Dataset:
         return self._mode(self.samples["frame"].index_select(0, torch.as_tensor(rows)).long())
 
     def match(self, rows: Rows) -> Tensor:
-        """(batch,) int64: index of each sample's match in `matches`."""
+        """Return (batch,) int64: index of each sample's match in `matches`."""
         frame = self.samples["frame"].index_select(0, torch.as_tensor(rows))
         return self.frames["match"].index_select(0, frame).long()
 
@@ -255,7 +255,7 @@ def _table(folder: Path, arrays: tuple[Array, ...], *, rows: int) -> dict[str, T
 
 
 def _open(path: Path, *, dtype: str, shape: Sequence[int | None]) -> Tensor:
-    """Map an array into memory and see that it is what the layout says; None in ``shape`` is any length."""
+    """Map an array into memory and check it against the layout; None in ``shape`` is any length."""
     try:
         # Copy-on-write, because torch warns of read-only memory. Nothing here writes.
         values: NDArray[Any] = np.load(path, mmap_mode="c", allow_pickle=False)

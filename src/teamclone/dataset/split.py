@@ -1,4 +1,4 @@
-"""Which match is for training, validation and test: whole matches, by hash, stratified by opponent."""
+"""The split into training, validation and test: whole matches, by hash, stratified by opponent."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAPER_TRAIN_SHARE = 0.95
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchKey:
-    """What splitting knows of a match; one between two teams that are both modelled has a key of each."""
+    """A match, for splitting; one between two teams that are both modelled has a key of each."""
 
     match_id: str
     opponent: str
@@ -34,7 +34,7 @@ def split_matches(
     test: float = 0.15,
     seed: int = 0,
 ) -> dict[str, Split]:
-    """The split of each match id.
+    """Return the split of each match id.
 
     Within each opponent the matches are ordered by a hash of seed and match id, so the answer depends on nothing but
     the set of matches. Test and validation get their share of all matches; opponents take turns by how much of their
@@ -87,7 +87,9 @@ def split_matches(
 
 
 def split_rows(n: int, *, match_id: str, seed: int = 0) -> NDArray[np.uint8]:
-    """The paper's split: the rows of a match at random, neighbouring cycles on both sides. For comparison: it leaks.
+    """Return the paper's split: the rows of a match at random.
+
+    Neighbouring cycles fall into different splits, so it leaks; it is here for comparison.
 
     Returns:
         (n,) Split values: 95 % TRAIN, the rest halved between VALIDATION and TEST.

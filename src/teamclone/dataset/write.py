@@ -25,10 +25,10 @@ _TABLES = {"frames": FRAME_ARRAYS, "samples": SAMPLE_ARRAYS}
 
 
 class DatasetWriter:
-    """A dataset that grows. What it holds in memory does not."""
+    """A dataset that is written part by part; its use of memory does not grow."""
 
     def __init__(self, folder: Path, *, where: Path) -> None:
-        """Of an empty folder; ``where`` is its name in errors. Use ``writing_dataset``."""
+        """Begin a dataset in an empty folder; ``where`` is its name in errors. Use ``writing_dataset``."""
         self._folder = folder
         self._where = where
         self._files: dict[tuple[str, str], _ArrayFile] = {}
@@ -41,11 +41,12 @@ class DatasetWriter:
 
     @property
     def n_frames(self) -> int:
-        """How many frames were added."""
+        """Number of frames added so far."""
         return self._files["frames", "match"].rows
 
     @property
     def n_samples(self) -> int:
+        """Number of samples added so far."""
         return self._files["samples", "frame"].rows
 
     def add(self, *, frames: Mapping[str, NDArray[Any]], samples: Mapping[str, NDArray[Any]]) -> None:
@@ -85,7 +86,7 @@ class DatasetWriter:
                 with a ``side`` of "right" where the modelled team was that; and ``commands``, unless they are CLONED.
 
         Raises:
-            DatasetError: what was added does not fit together.
+            DatasetError: the parts added do not fit together.
         """
         missing = [key for key in ("team", "matches") if key not in meta]
         if missing:
@@ -122,7 +123,7 @@ class DatasetWriter:
             file.close()
 
     def _check_references(self, types: NDArray[np.float32], n_matches: int, *, n_commands: int) -> None:
-        """Every index points at something: the readers gather without looking."""
+        """Raise unless every index points at something: readers gather without a check."""
         if types.ndim != 3 or types.shape[0] != n_matches or types.shape[2] != len(FIELDS):
             raise DatasetError(
                 f"{self._where}/player_types: expected shape ({n_matches}, types, {len(FIELDS)}), got {types.shape}"
@@ -157,7 +158,7 @@ class _ArrayFile:
         self.rows += len(values)
 
     def finish(self) -> bytes:
-        """Complete the file; the hash of its content."""
+        """Complete the file and return the hash of its content."""
         self._file.seek(0)
         if self._write_header() != self._room:
             raise AssertionError("the header of an array outgrew its room")
@@ -170,7 +171,7 @@ class _ArrayFile:
             self._file.close()
 
     def _write_header(self) -> int:
-        """Write it where the file is; how long it is."""
+        """Write the header where the file is, and return its length in bytes."""
         dtype, start = np.dtype(self._array.dtype), self._file.tell()
         np.lib.format.write_array_header_1_0(
             self._file, {"descr": dtype.str, "fortran_order": False, "shape": (self.rows, *self._array.shape)}
@@ -180,7 +181,7 @@ class _ArrayFile:
 
 @contextmanager
 def writing_dataset(folder: Path | str, *, replace: bool = False) -> Iterator[DatasetWriter]:
-    """A writer of a dataset, whose folder appears when it is finished; otherwise nothing is left of it.
+    """Yield a writer of a dataset; its folder appears only when it is finished.
 
     Args:
         folder: where to.
@@ -241,7 +242,7 @@ def write_dataset(
 
 
 def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: str) -> dict[str, NDArray[Any]]:
-    """The arrays of a table in the layout's types, all of one length."""
+    """Return the arrays of a table in the layout's types, all of one length."""
     names = [array.name for array in spec]
     if sorted(given) != sorted(names):
         raise DatasetError(f"{where}: expected the arrays {', '.join(names)}, got {', '.join(given)}")
@@ -255,12 +256,12 @@ def _rows(spec: tuple[Array, ...], given: Mapping[str, NDArray[Any]], *, where: 
 
 
 def _part(folder: Path, what: str) -> Path:
-    """A folder beside the dataset for what is not finished."""
+    """Return the path of a folder beside the dataset for unfinished work."""
     return folder.with_name(f".{folder.name}.{what}.part")
 
 
 def _tidy(folder: Path) -> None:
-    """Remove what killed writers of this dataset left."""
+    """Remove the remains of killed writers of this dataset."""
     for left in folder.parent.iterdir():
         if left.name.startswith(f".{folder.name}.") and left.suffix == ".part":
             with suppress(OSError), held(left):  # unless its writer lives

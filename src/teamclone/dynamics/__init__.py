@@ -1,1 +1,1 @@
-"""What rcssserver computes in a cycle."""
+"""The computations of rcssserver in a cycle."""

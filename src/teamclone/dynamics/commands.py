@@ -1,4 +1,4 @@
-"""What the server makes of a command before it acts on it."""
+"""The server's treatment of a command before it acts on it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Each formula of the server, once: elementwise over NumPy arrays, PyTorch tensors or plain numbers.
 
-Lengths in metres, velocities in metres per cycle, angles in radians unless a name says ``_deg``. Parameters of the
+Lengths in metres, velocities in metres per cycle, angles in radians unless a name ends in ``_deg``. Parameters of the
 server and of player types are arguments, so that a match is computed by its own. Sources name the files of rcssserver.
 
 The planner's compiled kernels need scalar forms of some of these; `tests/unit/planner/test_formulas.py` holds the two
@@ -20,28 +20,28 @@ Value = Any
 
 
 def _of(*values: Value) -> Any:
-    """The library that these values belong to: PyTorch if one is a tensor, else NumPy."""
+    """Return the library that these values belong to: PyTorch if one is a tensor, else NumPy."""
     torch = sys.modules.get("torch")
     return torch if torch is not None and any(isinstance(value, torch.Tensor) for value in values) else np
 
 
 def radians(degrees: Value) -> Value:
-    """Degrees in radians."""
+    """Return degrees in radians."""
     return degrees * (math.pi / 180.0)
 
 
 def wrap(angle: Value) -> Value:
-    """The same angle in [-pi, pi)."""
+    """Return an angle in [-pi, pi)."""
     return _of(angle).remainder(angle + math.pi, 2 * math.pi) - math.pi
 
 
 def off_angle(angle: Value) -> Value:
-    """How far an angle is off straight ahead, in [0, pi]; the same to the bit for its opposite."""
+    """Return how far an angle is off straight ahead, in [0, pi]; the same to the bit for its opposite."""
     return abs(wrap(abs(angle)))
 
 
 def roll(cycles: Value, decay: Value) -> Value:
-    """Metres that a body covers in so many cycles per metre per cycle of its first velocity, if nothing moves it.
+    """Return the metres that a free body covers in so many cycles, per metre per cycle of its first velocity.
 
     ``object.cpp``: every cycle it moves by its velocity, which is then multiplied by ``decay``. Logs hold velocities
     after decay, so the first cycle is covered with the velocity as logged.
@@ -50,11 +50,11 @@ def roll(cycles: Value, decay: Value) -> Value:
 
 
 def cycles_over(distance: Value, speed: Value, decay: Value, *, least: float = 0.0) -> Value:
-    """Cycles after which a body with this speed has covered a distance, the inverse of `roll`; not whole.
+    """Return the cycles in which a body of this speed covers a distance, the inverse of `roll`; not whole.
 
     Args:
-        least: what part of the speed is taken to be left where the distance is never covered; with 0 the answer is
-            infinite or not a number there.
+        least: the share of the speed that is taken to be left where the distance is never covered; with 0 the answer
+            is infinite or not a number there.
     """
     left = 1.0 - distance * (1.0 - decay) / speed
     xp = _of(left)
@@ -64,12 +64,15 @@ def cycles_over(distance: Value, speed: Value, decay: Value, *, least: float = 0
 
 
 def covered(cycles: Value, acceleration: Value, decay: Value) -> Value:
-    """Metres from rest in so many dashes, each of which adds ``acceleration`` to a velocity that then decays."""
+    """Return the metres from rest in so many dashes.
+
+    Each adds ``acceleration`` to a velocity that then decays.
+    """
     return acceleration / (1.0 - decay) * (cycles - decay * (1.0 - decay**cycles) / (1.0 - decay))
 
 
 def kickable_area(player_size: Value, kickable_margin: Value, ball_size: Value) -> Value:
-    """Metres between the centres of player and ball up to which the player can kick it (``player.cpp``)."""
+    """Return the metres between the centres of player and ball up to which the player can kick (``player.cpp``)."""
     return player_size + ball_size + kickable_margin
 
 
@@ -82,7 +85,7 @@ def kick_rate(
     kickable_margin: Value,
     ball_size: Value,
 ) -> Value:
-    """Metres per cycle that a unit of kick power gives the ball (``player.cpp``, kick).
+    """Return the metres per cycle that a unit of kick power gives the ball (``player.cpp``, kick).
 
     Args:
         distance: between the centres of player and ball.
@@ -94,7 +97,7 @@ def kick_rate(
 
 
 def limited(x: Value, y: Value, most: Value) -> tuple[Value, Value]:
-    """A vector with its length cut to ``most`` (``object.cpp``: accelerations and velocities)."""
+    """Return a vector with its length cut to ``most`` (``object.cpp``: accelerations and velocities)."""
     xp = _of(x, y, most)
     length = xp.hypot(x, y)
     factor = xp.where(length > most, most / xp.where(length > most, length, 1.0), 1.0)
@@ -110,12 +113,14 @@ def kicked(
     ball_accel_max: Value,
     ball_speed_max: Value,
 ) -> tuple[Value, Value]:
-    """Velocity of the ball after a single kick, before it moves and decays, without noise (``player.cpp``, kick).
+    """Return the ball's velocity after a single kick, before it moves and decays, without noise.
+
+    The formula is that of ``player.cpp``, kick.
 
     Args:
         velocity: of the ball before, as logged.
         power, direction: of the kick; the direction is that on the pitch: body plus argument.
-        rate: what `kick_rate` gives.
+        rate: see `kick_rate`.
     """
     xp = _of(direction)
     x, y = limited(rate * power * xp.cos(direction), rate * power * xp.sin(direction), ball_accel_max)
@@ -123,7 +128,7 @@ def kicked(
 
 
 def dash_rate(direction_deg: Value, *, side_dash_rate: Value, back_dash_rate: Value) -> Value:
-    """What part of a dash's power a direction leaves (``player.cpp``, dash).
+    """Return the share of a dash's power that a direction leaves (``player.cpp``, dash).
 
     Args:
         direction_deg: off the body, 0..180 degrees.
@@ -135,7 +140,7 @@ def dash_rate(direction_deg: Value, *, side_dash_rate: Value, back_dash_rate: Va
 
 
 def turn(moment: Value, speed: Value, inertia_moment: Value) -> Value:
-    """The angle by which a player turns, in the unit of ``moment`` (``player.cpp``, turn).
+    """Return the angle by which a player turns, in the unit of ``moment`` (``player.cpp``, turn).
 
     Args:
         speed: of the player, as logged.
@@ -152,7 +157,7 @@ def tackle_failure(
     tackle_width: Value,
     exponent: Value,
 ) -> Value:
-    """Probability that a tackle fails, 1 and more where it cannot succeed (``player.cpp``, tackle).
+    """Return the probability that a tackle fails, 1 and more where it cannot succeed (``player.cpp``, tackle).
 
     Args:
         forward, aside: metres to the ball along the body direction and across it.
@@ -174,7 +179,9 @@ def tackle_power(
     max_back_tackle_power: Value,
     tackle_power_rate: Value,
 ) -> Value:
-    """Metres per cycle that a tackle adds to the ball's velocity (``player.cpp``, tackle; clients from version 12).
+    """Return the metres per cycle that a tackle adds to the ball's velocity.
+
+    The formula is that of ``player.cpp``, tackle, for clients from version 12.
 
     Args:
         direction: argument of the tackle, from the body.
@@ -195,10 +202,10 @@ def rested(
     effort_min: Value,
     effort_max: Value,
 ) -> tuple[Value, Value, Value, Value]:
-    """Stamina, effort, recovery and capacity after the end of a cycle (``player.cpp``, updateStamina).
+    """Return stamina, effort, recovery and capacity after the end of a cycle (``player.cpp``, updateStamina).
 
     Args:
-        stamina: what the commands of the cycle have left.
+        stamina: after the commands of the cycle.
         server: parameters of the server by name: anything with ``server["stamina_max"]``.
     """
     xp = _of(stamina, effort)
@@ -217,6 +224,6 @@ def rested(
 
 
 def _like(values: Value, number: Value) -> Value:
-    """A number as what stands beside it: PyTorch's minimum and maximum take tensors only."""
+    """Return a number in the type of ``values``: PyTorch's minimum and maximum take tensors only."""
     xp = _of(values, number)
     return number if xp is np else xp.as_tensor(number, dtype=values.dtype, device=values.device)

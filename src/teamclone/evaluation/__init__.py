@@ -1,1 +1,1 @@
-"""How good a clone is: metrics, baselines, intervals, the paper's tables and figures, the report."""
+"""The quality of a clone: metrics, baselines, intervals, the paper's tables and figures, the report."""

@@ -1,4 +1,4 @@
-"""A model's answers for many states, in chunks: what evaluation and prediction share."""
+"""A model's answers for many states, in chunks, for evaluation and prediction."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def answers(
 
     Args:
         n: number of samples.
-        inputs_of: gives the state of some of them, or what `project` makes of it.
-        target_of: gives what the players did; None where that is not known.
+        inputs_of: gives the state of some of them, or their projected inputs.
+        target_of: gives the true commands; None where they are not known.
         kicks_of: gives which of the samples to answer on kicks and tackles, (k,) indices into the slice; None asks for
             those in which one was given.
         batch: samples per pass.

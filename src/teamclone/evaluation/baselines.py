@@ -1,4 +1,4 @@
-"""What needs no network: rules that know the training counts and, at most, the player's last command.
+"""Baselines without a network: rules from the training counts and, at most, the player's last command.
 
 A clone that does not beat them has learned nothing. Each gives probabilities, so that the same figures apply.
 """
@@ -15,7 +15,7 @@ from teamclone.evaluation.predictions import Predictions
 from teamclone.rcss.commands import CLONED, parameters_of
 
 SMOOTHING = 1.0
-"""Added to every count (Laplace), so that what the training matches never showed keeps a probability."""
+"""Added to every count (Laplace), so that events missing in the training matches keep a probability."""
 
 NAMES = ("majority", "persistence", "markov")
 
@@ -41,7 +41,7 @@ class Baselines:
         return share
 
     def table(self, name: str) -> Floats:
-        """(commands + 1, commands) the probabilities a baseline gives after each last command, the last row if unknown.
+        """Return (commands + 1, commands) a baseline's probabilities after each last command, the last row if unknown.
 
         majority: the prior, whatever came before; its prediction is the most frequent command.
         persistence: the last command with the share of repetitions in training, the rest split by the prior; the
@@ -71,7 +71,7 @@ class Baselines:
         raise ValueError(f"unknown baseline {name!r}, expected one of {', '.join(NAMES)}")
 
     def answer(self, name: str, outcome: Predictions) -> Predictions:
-        """The same rows with a baseline's answers in place of the model's."""
+        """Return the rows of ``outcome`` with a baseline's answers in place of the model's."""
         probabilities = self.table(name)[outcome.last].astype(np.float32)  # -1, none known, is the last row
         parameters = np.broadcast_to(self.parameters.astype(np.float32), outcome.parameters.shape)
         return replace(
@@ -92,7 +92,7 @@ class Counter:
 
     @classmethod
     def empty(cls, commands: tuple[str, ...] = CLONED) -> Counter:
-        """Nothing counted yet."""
+        """Return counts of zero."""
         n_kinds, n_parameters = len(commands), len(parameters_of(commands))
         return cls(
             commands=commands,
@@ -108,7 +108,7 @@ class Counter:
             self.histograms[index] += np.bincount(np.clip(steps, -180, 180) + 180, minlength=361)
 
     def finish(self) -> Baselines:
-        """The baselines of everything counted."""
+        """Return the baselines of everything counted."""
         items = parameters_of(self.commands)
         parameters = np.array(
             [_median(counts, angle=item.angle) for counts, item in zip(self.histograms, items, strict=True)]
@@ -117,7 +117,7 @@ class Counter:
 
 
 def _median(counts: Counts, *, angle: bool) -> float:
-    """The value in -180..180 with the least mean absolute distance to all, around the circle for angles."""
+    """Return the value in -180..180 with the least mean absolute distance to all, around the circle for angles."""
     if not counts.any():
         return float("nan")
     values = np.arange(-180, 181)

@@ -13,26 +13,26 @@ from teamclone.evaluation.metrics import Counts, Floats, Sums
 N_RESAMPLES = 1000
 LEVEL = 0.95
 FEW_MATCHES = 10
-"""Below, a percentile interval is clearly too narrow; that of two matches is just these two. Readers are told so."""
+"""With fewer matches a percentile interval is clearly too narrow, and the report warns of it."""
 
 
 def draw(n_matches: int, *, seed: int, n_resamples: int = N_RESAMPLES) -> Counts:
-    """How often each match occurs in each resample: (n_resamples, n_matches), every row sums to n_matches.
+    """Return how often each match occurs in each resample: (n_resamples, n_matches), every row sums to n_matches.
 
-    The same seed gives the same resamples, so differences between models of the same matches are paired.
+    Equal seeds give equal resamples, so differences between two models on the same matches are paired.
     """
     generator = np.random.default_rng(seed)
     return generator.multinomial(n_matches, np.full(n_matches, 1.0 / n_matches), size=n_resamples).astype(np.int64)
 
 
 def resample(sums: Sums, occurrences: Counts) -> Sums:
-    """The totals of every resample: per-match sums (n_matches, ...) become (n_resamples, ...)."""
+    """Return the totals of every resample: per-match sums (n_matches, ...) become (n_resamples, ...)."""
     weights = occurrences.astype(np.float64)
     return Sums(*(np.tensordot(weights, values, axes=1) for values in sums))
 
 
 def interval(values: NDArray[np.floating], *, level: float = LEVEL) -> tuple[Floats, Floats]:
-    """Percentile interval over the first axis, ignoring NaN; NaN where nothing is known (Efron 1979).
+    """Return a percentile interval over the first axis, ignoring NaN; NaN where all are NaN (Efron 1979).
 
     A figure that is undefined in some resamples (the recall of a command that few matches hold) gets its interval from
     the others.

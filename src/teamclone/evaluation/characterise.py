@@ -1,4 +1,4 @@
-"""``characterise``: what the commands of a dataset look like, whatever a model makes of them."""
+"""``characterise``: the distribution of a dataset's commands, without a model."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TURN_EDGES = np.arange(-181.5, 182.0, 3.0)
 
 
 def characterise(dataset: Dataset, *, seed: int = 0) -> dict[str, Any]:
-    """What the rows look like: commands by split, turn moments, where each command was given (Figs 4 to 6)."""
+    """Count the rows: commands by split, turn moments, where each command was given (Figs 4 to 6)."""
     kinds, splits = dataset.samples["kind"].numpy(), dataset.samples["split"].numpy()
     names = dataset.commands
     square = np.bincount(splits.astype(np.int64) * len(names) + kinds, minlength=len(Split) * len(names))

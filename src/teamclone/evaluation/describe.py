@@ -1,4 +1,4 @@
-"""``describe``: the figures of one split, from predictions beside what happened."""
+"""``describe``: the figures of one split, from predictions beside the true commands."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Value = dict[str, float | None]
 def describe(
     outcome: Predictions, *, baselines: rules.Baselines, matches: Sequence[dict[str, Any]], seed: int = 0
 ) -> dict[str, Any]:
-    """All figures of one split; intervals where it has two matches or more.
+    """Return all figures of one split; intervals where it has two matches or more.
 
     Args:
         outcome: the split.
         baselines: counts of the training split.
-        matches: what is known of each match, indexed by ``outcome.match``; ``match_id`` and ``opponent`` are read. The
+        matches: facts of each match, indexed by ``outcome.match``; ``match_id`` and ``opponent`` are read. The
             two entries of a match in which both teams are modelled count as one.
         seed: of the bootstrap.
     """
@@ -72,7 +72,7 @@ def describe(
             "accuracy_gain": _value(gain, gains),
             "cross_entropy_skill": _value(skill, skills),
         }
-        # Made for networks that answer zero for parameters not issued; of a constant guess it says nothing.
+        # Made for networks that answer zero for parameters not issued; it has no meaning for a constant guess.
         del section["baselines"][name]["paper_mae"]
     guess = baselines.answer("majority", outcome)
     medians = metrics.median_errors(guess.parameters, guess.issued, guess.commands)
@@ -96,7 +96,7 @@ def unseen_numbers(
     paper's does, has then never seen a field player with the number that the goalkeeper had in training.
 
     Args:
-        outcome: the split. players: (n,) who acted in it. trained: who acted in the rows of training.
+        outcome: the split. players: (n,) the actors in it. trained: the actors in the rows of training.
     """
     right = outcome.probabilities.argmax(axis=1) == outcome.kind
     return {
@@ -109,13 +109,13 @@ def unseen_numbers(
 
 
 def number(value: Any) -> float | None:
-    """For JSON: a Python float, None where it is undefined."""
+    """Return a Python float for JSON, None where it is undefined."""
     scalar = float(value)
     return scalar if math.isfinite(scalar) else None
 
 
 def _value(point: Any, spread: NDArray[np.float64] | None) -> Value:
-    """A figure with its interval, from its resampled values (n_resamples,)."""
+    """Return a figure with its interval, from its resampled values (n_resamples,)."""
     if spread is None:
         return {"value": number(point), "low": None, "high": None}
     low, high = bootstrap.interval(spread)
@@ -129,7 +129,10 @@ def _scores(point: Scores, spread: Scores | None) -> dict[str, Value]:
 
 
 def _situations(outcome: Predictions) -> dict[str, Any]:
-    """``situations``: rows, accuracy and cross-entropy in play_on and by who restarts; nothing where all is play_on."""
+    """Return ``situations``: rows, accuracy and cross-entropy in play_on and by the team that restarts.
+
+    Nothing where all is play_on.
+    """
     if outcome.mode is None or (outcome.mode == PlayMode.PLAY_ON).all():
         return {}
     restarts = RESTARTS[outcome.mode]
@@ -150,12 +153,12 @@ def _situations(outcome: Predictions) -> dict[str, Any]:
 
 
 def _gain(model: Scores, other: Scores) -> tuple[Any, Any]:
-    """By how much accuracy is higher, and which share of the other's cross-entropy is gone."""
+    """Return by how much accuracy is higher, and which share of the other's cross-entropy is gone."""
     return model.accuracy - other.accuracy, 1.0 - metrics.ratio(model.cross_entropy, other.cross_entropy)
 
 
 def _by_match(sums: Sums, used: NDArray[np.int64], matches: Sequence[dict[str, Any]]) -> tuple[Sums, list[list[int]]]:
-    """Sums of entries, those indexed by ``used``, as sums of matches, and the entries of each.
+    """Return sums of entries, those indexed by ``used``, as sums of matches, and the entries of each.
 
     Two entries of one match, each of another team, are the same game: no independent draws.
     """
@@ -229,7 +232,7 @@ def _curve(curve: metrics.Curve) -> dict[str, list[Any]]:
 def _opponents(
     used: NDArray[np.int64], sums: Sums, matches: Sequence[dict[str, Any]], *, seed: int
 ) -> list[dict[str, Any]]:
-    """The split by opponent, the best understood first."""
+    """Return the split by opponent, the most accurate first."""
     names = np.array([str(matches[index]["opponent"]) for index in used], object)
     table = []
     for name in sorted(set(names)):

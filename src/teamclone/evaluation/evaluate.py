@@ -1,4 +1,4 @@
-"""``evaluate``: how good a run is on the splits of a dataset, as the numbers behind tables, figures and report."""
+"""``evaluate``: the quality of a run on the splits of a dataset, the numbers behind tables, figures and report."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def evaluate(
     seed: int = 0,
     on_progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Everything the report needs to know about a run; JSON types only, undefined figures are None.
+    """Return everything the report needs to know about a run; JSON types only, undefined figures are None.
 
     Args:
         run: a finished or interrupted training run.
@@ -108,7 +108,7 @@ def evaluate(
 
 
 def _datasets(run: Run, dataset: Dataset | Path | str | None) -> tuple[Dataset, Dataset | None]:
-    """The dataset to evaluate on, and the run's own; that is None where it is gone and another is given."""
+    """Return the dataset to evaluate on, and the run's own; that is None where it is gone and another is given."""
     own = _own_dataset(run, needed=dataset is None)
     if dataset is None:
         assert own is not None
@@ -124,7 +124,7 @@ def _datasets(run: Run, dataset: Dataset | Path | str | None) -> tuple[Dataset, 
 
 
 def _rows(data: Dataset, splits: tuple[Split, ...]) -> dict[Split, NDArray[np.int64]]:
-    """Rows of the splits that have any."""
+    """Return the rows of the splits that have any."""
     rows = {split: index for split in splits if len(index := data.split(split))}
     if not rows:
         names = ", ".join(split.name.lower() for split in splits)
@@ -133,7 +133,7 @@ def _rows(data: Dataset, splits: tuple[Split, ...]) -> dict[Split, NDArray[np.in
 
 
 def _about(data: Dataset) -> dict[str, Any]:
-    """What the document says of a dataset."""
+    """Return the document's description of a dataset."""
     return {
         "path": str(data.path),
         "id": data.id,
@@ -146,7 +146,7 @@ def _about(data: Dataset) -> dict[str, Any]:
 
 
 def count_training(dataset: Dataset, *, on_batch: Callable[[int], None] | None = None) -> rules.Baselines:
-    """What the baselines know: the training split of a dataset, counted."""
+    """Count the training split of a dataset for the baselines."""
     counter = rules.Counter.empty(dataset.commands)
     rows = dataset.split(Split.TRAIN)
     for start in range(0, len(rows), 32 * BATCH):
@@ -159,18 +159,18 @@ def count_training(dataset: Dataset, *, on_batch: Callable[[int], None] | None =
 
 
 def _players(dataset: Dataset, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """(n,) who gave the commands: 0..10 for the numbers 1..11."""
+    """Return (n,) the players that gave the commands: 0..10 for the numbers 1..11."""
     players: NDArray[np.uint8] = dataset.samples["player"].numpy()[rows]
     return players
 
 
 def _without_matches(cleaning: dict[str, Any] | None) -> dict[str, Any] | None:
-    """The cleaning report over all matches."""
+    """Return the cleaning report over all matches."""
     return None if cleaning is None else {key: value for key, value in cleaning.items() if key != "matches"}
 
 
 def _own_dataset(run: Run, *, needed: bool) -> Dataset | None:
-    """The dataset the run was trained on; None when it is gone and another is given."""
+    """Return the dataset the run was trained on; None when it is gone and another is given."""
     try:
         return open_dataset(run.dataset_path)
     except DatasetError as error:
@@ -180,7 +180,7 @@ def _own_dataset(run: Run, *, needed: bool) -> Dataset | None:
 
 
 def _used(dataset: Dataset, split: Split) -> list[dict[str, Any]]:
-    """The matches that have samples in a split."""
+    """Return the matches that have samples in a split."""
     used = np.unique(dataset.match(dataset.split(split)).numpy())
     return [dataset.matches[index] for index in used]
 
@@ -203,14 +203,14 @@ def evaluate_and_save(
 
 
 def evaluation_path(run: Run, evaluation: dict[str, Any]) -> Path:
-    """Where an evaluation belongs: RUN/evaluation.json, or by the dataset's name if it is another than the run's."""
+    """Return the path of an evaluation: RUN/evaluation.json, or a file named after another dataset."""
     if evaluation["dataset"]["own"]:
         return Path(run.path) / "evaluation.json"
     return Path(run.path) / f"evaluation-{Path(evaluation['dataset']['path']).name}.json"
 
 
 def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
-    """Write an evaluation into its run, whole or not at all; where it went."""
+    """Write an evaluation into its run, whole or not at all; return its file."""
     path = evaluation_path(run, evaluation)
     write_document(path, evaluation)
     return path

@@ -38,7 +38,7 @@ _STYLE = style(Colours(ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SE
 
 
 def svg(figure: Figure, *, name: str, alt: str) -> str:
-    """A figure as an inline <svg> element: ids unique by ``name``, a text alternative, colours of the page."""
+    """Return a figure as an inline <svg> element: ids unique by ``name``, a text alternative, colours of the page."""
     stream = io.StringIO()
     with mpl.rc_context(_STYLE):
         figure.savefig(stream, format="svg", transparent=True, dpi=160, metadata={"Date": None, "Creator": None})
@@ -67,13 +67,13 @@ def _figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> t
 
 
 def _kinds(given: Mapping[str, Any]) -> list[str]:
-    """KINDS, and whatever other commands there are."""
+    """Return KINDS, and whatever other commands there are."""
     return [kind for kind in REPERTOIRE if kind in KINDS or kind in given]
 
 
 @mpl.rc_context(_STYLE)
 def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[str, int]) -> Figure:
-    """Fig. 4: where each command was given, one pitch per command, a sample of points (n, 2) in metres."""
+    """Draw Fig. 4: where each command was given, one pitch per command, a sample of points (n, 2) in metres."""
     kinds = _kinds(points)
     rows = math.ceil(len(kinds) / 2)
     figure, grid = _figure(2.75 * rows, rows, 2)
@@ -90,7 +90,7 @@ def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[s
 
 @mpl.rc_context(_STYLE)
 def frequencies(counts: Mapping[str, int]) -> Figure:
-    """Fig. 5: commands by kind."""
+    """Draw Fig. 5: commands by kind."""
     kinds = _kinds(counts)
     figure, axes = _figure(1.75 * len(kinds) / len(KINDS))
     total = max(sum(counts.values()), 1)
@@ -117,7 +117,7 @@ def frequencies(counts: Mapping[str, int]) -> Figure:
 
 @mpl.rc_context(_STYLE)
 def turn_moments(edges: Sequence[float], counts: Sequence[int], *, zero: int, turns: int) -> Figure:
-    """Fig. 6: turn moments in degrees on a logarithmic scale; ``zero`` of all ``turns`` are exactly (turn 0)."""
+    """Draw Fig. 6: turn moments in degrees, logarithmic; ``zero`` of all ``turns`` are exactly (turn 0)."""
     figure, axes = _figure(2.7)
     # Limits first: a logarithmic axis cannot find its own where nothing was counted.
     axes.set_ylim(0.7, max([*counts, 1]) * 8)
@@ -145,7 +145,7 @@ CURVES = (
 
 @mpl.rc_context(_STYLE)
 def training_curves(history: Sequence[Mapping[str, Any]], *, best_epoch: int | None = None) -> Figure:
-    """Fig. 7: a panel for every pair of curves that the history holds, training against validation."""
+    """Draw Fig. 7: a panel for every pair of curves in the history, training against validation."""
     epochs = [row["epoch"] for row in history]
     known = [curve for curve in CURVES if any(row.get(key) is not None for row in history for key in curve[1:])]
     columns = 2 if len(known) > 1 else 1
@@ -171,7 +171,7 @@ def training_curves(history: Sequence[Mapping[str, Any]], *, best_epoch: int | N
 
 
 def _error_bars(values: Sequence[Mapping[str, Any]]) -> tuple[list[float], Any]:
-    """Points and the (2, n) lengths of their bars; 0 where there is no interval."""
+    """Return points and the (2, n) lengths of their bars; 0 where there is no interval."""
     points = [math.nan if value["value"] is None else float(value["value"]) for value in values]
     low = [0.0 if v.get("low") is None else max(p - v["low"], 0.0) for p, v in zip(points, values, strict=True)]
     high = [0.0 if v.get("high") is None else max(v["high"] - p, 0.0) for p, v in zip(points, values, strict=True)]
@@ -188,7 +188,7 @@ SEEN_UNSEEN = (
 
 @mpl.rc_context(_STYLE)
 def seen_unseen(splits: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Fig. 8: the same figures on every split, with 95 % intervals; ``splits`` holds figures as {value, low, high}."""
+    """Draw Fig. 8: figures of every split with 95 % intervals; ``splits`` holds them as {value, low, high}."""
     names = list(splits)
     figure, grid = _figure(0.55 + 0.42 * len(names), 1, len(SEEN_UNSEEN), sharey=True, squeeze=False)
     for axes, (key, title) in zip(grid.flat, SEEN_UNSEEN, strict=True):
@@ -216,7 +216,10 @@ def seen_unseen(splits: Mapping[str, Mapping[str, Any]]) -> Figure:
 
 @mpl.rc_context(_STYLE)
 def opponents(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Accuracy by opponent, with 95 % intervals; a row has split, opponent, accuracy {value, low, high}, matches."""
+    """Draw accuracy by opponent with 95 % intervals.
+
+    A row has split, opponent, accuracy {value, low, high}, matches.
+    """
     figure, axes = _figure(0.6 + 0.26 * len(rows))
     points, bars = _error_bars([row["accuracy"] for row in rows])
     place = np.arange(len(rows))
@@ -238,7 +241,7 @@ def opponents(rows: Sequence[Mapping[str, Any]]) -> Figure:
 
 @mpl.rc_context(_STYLE)
 def reliability(calibration: Mapping[str, Any]) -> Figure:
-    """Reliability diagrams: of the predicted command, and of each command's own probability."""
+    """Draw reliability diagrams: of the predicted command, and of each command's own probability."""
     figure, (left, right) = _figure(3.5, 1, 2)
     for axes in (left, right):
         axes.plot([0, 1], [0, 1], color=MUTED, linewidth=0.9, linestyle=(0, (3, 3)), zorder=1)
@@ -252,7 +255,7 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
     top = calibration["predicted_command"]
     left.plot(top["confidence"], top["observed_frequency"], color=ACCENT, marker="o", markersize=4)
     left.set_title("the predicted command")
-    left.set_xlabel("probability said")
+    left.set_xlabel("predicted probability")
     left.set_ylabel("share that came true")
     for kind, curve in calibration["commands"].items():
         if sum(curve["rows"]):
@@ -265,14 +268,14 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
                 label=kind,
             )
     right.set_title("each command")
-    right.set_xlabel("probability said")
+    right.set_xlabel("predicted probability")
     right.legend(loc="upper left")
     return figure
 
 
 @mpl.rc_context(_STYLE)
 def response_times(edges_us: Sequence[float], counts: Sequence[int], *, p50_us: float, p99_us: float) -> Figure:
-    """Fig. 9: histogram of the times of single predictions, microseconds."""
+    """Draw Fig. 9: histogram of the times of single predictions, microseconds."""
     figure, axes = _figure(2.4)
     axes.stairs(counts, edges_us, fill=True, color=ACCENT, alpha=0.85)
     top = max([*counts, 1])

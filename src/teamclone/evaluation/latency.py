@@ -1,4 +1,4 @@
-"""How long one answer takes (Fig. 9 of the paper): single predictions on one thread, real situations."""
+"""Response times (Fig. 9 of the paper): single predictions on one thread, real situations."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from teamclone.training.run import Run
 
 FORMAT = 1
-"""Of bench.json."""
+"""Format number of bench.json."""
 N_PREDICTIONS = 20_000
 WARM_UP = 200
 N_STATES = 512
-"""Different situations that the predictions take in turn."""
+"""Number of different situations that the predictions take in turn."""
 
 
 def measure_run(
@@ -41,7 +41,7 @@ def measure_run(
     n: int = N_PREDICTIONS,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> tuple[dict[str, Any], Path]:
-    """Time the predictions of a run as `measure_latency` does and write RUN/bench.json.
+    """Time the predictions of a run, see `measure_latency`, and write RUN/bench.json.
 
     Args:
         run: the run.
@@ -72,10 +72,10 @@ def measure_latency(
     seed: int = 0,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Times of ``n`` predictions of one state each and of batches of 22, in microseconds, on one thread of the CPU.
+    """Time ``n`` predictions of one state each and of batches of 22, in microseconds, on one CPU thread.
 
-    Timed is what a user calls: raw state in, probabilities and parameters out, features and normalisation included;
-    reading the state is not.
+    The time is that of a user's call: raw state in, probabilities and parameters out, with features and normalisation;
+    without reading the state.
 
     Raises:
         DatasetError: the dataset has no samples, or a match lacks what the model needs.

@@ -25,7 +25,7 @@ CALIBRATION_BINS = 15
 
 
 def even_log_loss(commands: Sequence[str]) -> dict[str, float]:
-    """What an even guess over the whole range of a command's parameters has as `Predictions.parameter_log_loss`."""
+    """Return the `Predictions.parameter_log_loss` of an even guess over the whole range of a command's parameters."""
     return {
         name: sum(
             math.log(item.limit if item.unit == "power" else 2 * item.limit)
@@ -37,12 +37,14 @@ def even_log_loss(commands: Sequence[str]) -> dict[str, float]:
 
 
 class Sums(NamedTuple):
-    """What every figure is computed from. Leading axes (...) are matches or resamples; none for a total.
+    """The sums from which every figure is computed.
+
+    Leading axes (...) are matches or resamples; none for a total.
 
     Attributes:
         confusion: (..., commands, commands) rows with [command given, command predicted].
         log_loss: (...) sum of -ln(probability of the command given), nats.
-        brier: (...) sum of squared distances between probabilities and what happened, 0 to 2 a row.
+        brier: (...) sum of squared distances between probabilities and the one-hot truth, 0 to 2 a row.
         bin_count: (..., bins) rows by confidence in the predicted command.
         bin_confidence: (..., bins) their summed confidence.
         bin_hits: (..., bins) those predicted right.
@@ -66,31 +68,34 @@ class Sums(NamedTuple):
     paper_error: Floats
 
     def select(self, matches: NDArray[np.integer] | NDArray[np.bool_]) -> Sums:
-        """Some entries of the first axis."""
+        """Return some entries of the first axis."""
         return Sums(*(values[matches] for values in self))
 
     def total(self) -> Sums:
-        """Summed over the first axis."""
+        """Return the sums over the first axis."""
         return Sums(*(values.sum(axis=0) for values in self))
 
 
 def confusion_matrix(
     kind: NDArray[np.integer], predicted: NDArray[np.integer], *, n_kinds: int = len(CLONED)
 ) -> Counts:
-    """(n_kinds, n_kinds) rows with [command given, command predicted], from (n,) indices of commands."""
+    """Return (n_kinds, n_kinds) rows with [command given, command predicted], from (n,) indices of commands."""
     counts = np.bincount(kind * n_kinds + predicted, minlength=n_kinds * n_kinds)
     return counts.astype(np.int64).reshape(n_kinds, n_kinds)
 
 
 def log_loss(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
-    """(n,) -ln of the probability of what happened, nats; a probability of 0 counts as the smallest float32 step."""
+    """Return (n,) -ln of the probability of the true command, nats; 0 counts as the smallest float32 step."""
     given = probabilities[np.arange(len(kind)), kind].astype(np.float64)
     loss: Floats = -np.log(np.clip(given, np.finfo(np.float32).eps, 1.0))
     return loss
 
 
 def brier(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Floats:
-    """(n,) squared distance to the one-hot truth, summed over the commands (Brier 1950): 0 best, 2 worst."""
+    """Return (n,) squared distance to the one-hot truth, summed over the commands.
+
+    0 is best, 2 worst (Brier 1950).
+    """
     distance = probabilities.astype(np.float64)
     distance[np.arange(len(kind)), kind] -= 1.0
     squared: Floats = np.square(distance).sum(axis=1)
@@ -100,7 +105,9 @@ def brier(probabilities: NDArray[np.floating], kind: NDArray[np.integer]) -> Flo
 def parameter_errors(
     predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
 ) -> Floats:
-    """(n, parameters) absolute errors in power, degrees around the circle and metres; NaN where nothing was issued.
+    """Return (n, parameters) absolute errors.
+
+    In power, degrees around the circle and metres; NaN where nothing was issued.
 
     Around the circle 179 and -179 degrees are 2 degrees apart.
     """
@@ -114,9 +121,11 @@ def parameter_errors(
 def paper_errors(
     predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
 ) -> Floats:
-    """(n,) the paper's regression error: the mean over all outputs in [-1, 1], zero expected where nothing was issued.
+    """Return (n,) the paper's regression error.
 
-    Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it says little about
+    It is the mean over all outputs in [-1, 1], zero expected where nothing was issued.
+
+    Five or four of the six are usually zeros that are easy to predict, and angles do not wrap, so it hardly measures
     the error of a command's parameter; it is here to be compared with the published 0.069.
     """
     limits = np.array([item.limit for item in parameters_of(commands)])
@@ -126,7 +135,7 @@ def paper_errors(
 
 
 def confidence_edges(probabilities: NDArray[np.floating], bins: int = CALIBRATION_BINS) -> Floats:
-    """Inner edges that cut the rows into bins of equal mass by the probability of their predicted command.
+    """Return inner edges that cut rows into bins of equal mass by the probability of the predicted command.
 
     Shape (bins - 1,) or fewer: equal confidences are never parted.
     """
@@ -136,10 +145,10 @@ def confidence_edges(probabilities: NDArray[np.floating], bins: int = CALIBRATIO
 
 
 def measure(outcome: Predictions, *, edges: Floats | None = None) -> tuple[Counts, Sums]:
-    """The matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
+    """Return the matches of an outcome, ascending (n_matches,), and the sums of each: first axis n_matches.
 
     Args:
-        outcome: what was predicted and what happened.
+        outcome: the predictions and the true commands.
         edges: inner edges of the confidence bins; None cuts this outcome into bins of equal mass.
     """
     edges = confidence_edges(outcome.probabilities) if edges is None else edges
@@ -182,7 +191,7 @@ def measure(outcome: Predictions, *, edges: Floats | None = None) -> tuple[Count
 
 
 def ratio(numerator: NDArray[np.number], denominator: NDArray[np.number]) -> Floats:
-    """Element by element; NaN where the denominator is 0, because such a rate is undefined, not 0."""
+    """Divide element by element; NaN where the denominator is 0, because such a rate is undefined, not 0."""
     top, bottom = np.broadcast_arrays(np.asarray(numerator, np.float64), np.asarray(denominator, np.float64))
     result: Floats = np.divide(top, bottom, out=np.full(top.shape, np.nan), where=bottom != 0)
     return result
@@ -215,7 +224,7 @@ class Rates(NamedTuple):
 
 
 def rates(confusion: NDArray[np.number]) -> Rates:
-    """Rates per command of (..., commands, commands) confusion matrices; NaN where undefined."""
+    """Return rates per command of (..., commands, commands) confusion matrices; NaN where undefined."""
     confusion = np.asarray(confusion, np.float64)
     hits = np.diagonal(confusion, axis1=-2, axis2=-1)
     support, predicted = confusion.sum(axis=-1), confusion.sum(axis=-2)
@@ -261,7 +270,7 @@ class Scores(NamedTuple):
 
 
 def scores(sums: Sums) -> Scores:
-    """Figures of every entry of the leading axes; NaN where there is no row."""
+    """Return figures of every entry of the leading axes; NaN where there is no row."""
     rows = sums.confusion.sum(axis=(-2, -1))
     rate = rates(sums.confusion)
     gap = np.abs(sums.bin_hits - sums.bin_confidence).sum(axis=-1)
@@ -277,12 +286,12 @@ def scores(sums: Sums) -> Scores:
 
 
 def _mean_where(values: Floats, where: NDArray[np.bool_]) -> Floats:
-    """Mean over the last axis of the values at True."""
+    """Return the mean over the last axis of the values at True."""
     return ratio(np.where(where, np.nan_to_num(values), 0.0).sum(axis=-1), where.sum(axis=-1))
 
 
 class Curve(NamedTuple):
-    """A reliability curve, (bins,) each: rows, mean probability said, share that came true."""
+    """A reliability curve, (bins,) each: rows, mean predicted probability, share that came true."""
 
     rows: Floats
     confidence: Floats
@@ -290,7 +299,7 @@ class Curve(NamedTuple):
 
 
 def top_label_curve(sums: Sums) -> Curve:
-    """How often the predicted command was right, by the confidence in it; bins without rows are left out."""
+    """Return how often the predicted command was right, by the confidence in it; bins without rows are left out."""
     filled = sums.bin_count > 0
     count = sums.bin_count[filled]
     return Curve(
@@ -299,19 +308,19 @@ def top_label_curve(sums: Sums) -> Curve:
 
 
 def command_curve(outcome: Predictions, kind: int, bins: int = CALIBRATION_BINS) -> Curve:
-    """How often a command was given, by the probability said for it, over all rows in bins of equal mass."""
-    said = outcome.probabilities[:, kind].astype(np.float64)
-    if len(said) == 0:
+    """Return how often a command was given, by its predicted probability, over all rows in bins of equal mass."""
+    predicted = outcome.probabilities[:, kind].astype(np.float64)
+    if len(predicted) == 0:
         return Curve(rows=np.zeros(0), confidence=np.zeros(0), observed_frequency=np.zeros(0))
-    edges = np.unique(np.quantile(said, np.arange(1, bins) / bins))
-    place = np.searchsorted(edges, said, side="right")
+    edges = np.unique(np.quantile(predicted, np.arange(1, bins) / bins))
+    place = np.searchsorted(edges, predicted, side="right")
     count = np.bincount(place, minlength=len(edges) + 1).astype(np.float64)
     filled = count > 0
-    total_said = np.bincount(place, weights=said, minlength=len(count))
+    summed = np.bincount(place, weights=predicted, minlength=len(count))
     total_true = np.bincount(place, weights=(outcome.kind == kind).astype(np.float64), minlength=len(count))
     return Curve(
         rows=count[filled],
-        confidence=(total_said / np.maximum(count, 1))[filled],
+        confidence=(summed / np.maximum(count, 1))[filled],
         observed_frequency=ratio(total_true, count)[filled],
     )
 
@@ -319,7 +328,7 @@ def command_curve(outcome: Predictions, kind: int, bins: int = CALIBRATION_BINS)
 def median_errors(
     predicted: NDArray[np.floating], issued: NDArray[np.floating], commands: tuple[str, ...] = CLONED
 ) -> Floats:
-    """(parameters,) median absolute error of the commands that carried each parameter; NaN where none did."""
+    """Return (parameters,) median absolute error of the commands that carried each parameter; NaN where none did."""
     error = parameter_errors(predicted, issued, commands)
     medians = np.full(error.shape[1], np.nan)
     for index, column in enumerate(error.T):

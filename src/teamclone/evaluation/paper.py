@@ -1,4 +1,4 @@
-"""The figures that Coimbra and Máximo published, and what their counts really give.
+"""The figures that Coimbra and Máximo published, and those recomputed from their counts.
 
 Published: "Team Modeling with Deep Behavioral Cloning for the RoboCup 2D Soccer Simulation League", section III and
 Table IV. Corrected: recomputed from the counts in the notebook of their public code, whose "recall" and "specificity"

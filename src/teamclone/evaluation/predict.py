@@ -1,4 +1,4 @@
-"""``predict``: a model's answers for samples of a dataset, beside what happened."""
+"""``predict``: a model's answers for samples of a dataset, beside the true commands."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def predict(
 ) -> Predictions:
     """Predict the commands of some samples of a dataset.
 
-    Parameters of kicks and tackles are those of the samples in which one was given; nobody measures the others.
+    Parameters of kicks and tackles are those of the samples in which one was given; no figure needs the others.
 
     Args:
         model: a clone; it is put into evaluation mode.
         dataset: where the samples lie.
         rows: (n,) indices of samples.
-        inputs: (n, columns) what the features project from these samples, where a caller has it; None makes it.
+        inputs: (n, columns) projected inputs of these samples, where a caller has them; None computes them.
         batch: samples per pass.
         on_batch: called with the number of samples just done.
 
@@ -76,7 +76,7 @@ def predict(
 def truth(
     dataset: Dataset, rows: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64]]:
-    """kind (n,), issued (n, parameters) and last (n,) as in `Predictions`, of some samples."""
+    """Return kind (n,), issued (n, parameters) and last (n,), see `Predictions`, of samples ``rows`` (n,)."""
     target = dataset.target(rows)
     kind, arguments = target.kind.numpy(), target.parameters.numpy()
     items = parameters_of(dataset.commands)

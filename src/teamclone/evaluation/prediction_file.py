@@ -1,4 +1,4 @@
-"""``predict_logs``: what a clone predicts of many matches, as one file."""
+"""``predict_logs``: a clone's predictions for many matches, as one file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SUFFIXES = (".parquet", ".csv", ".jsonl")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictedMatch:
-    """What became of one log.
+    """The outcome for one log.
 
     Attributes:
         path: the game log. match_id: of the match, None where the log could not be read.
@@ -68,7 +68,7 @@ def predict_logs(
         on_progress: called with the log, the rows done and the rows of this match.
 
     Returns:
-        What became of each log, in their order.
+        The outcome for each log, in their order.
 
     Raises:
         UsageError: the ending of ``out`` is unknown, or neither or both of team and side are named.
@@ -136,7 +136,7 @@ class _JsonLines:
 
 @contextmanager
 def _writing(out: Path) -> Iterator[Callable[[pa.Table], None]]:
-    """Give a function that appends a table to a file, which gets its name when all of it is there."""
+    """Return a function that appends a table to a file, which gets its name when all of it is there."""
     out.parent.mkdir(parents=True, exist_ok=True)
     temporary = out.with_name(f".{out.name}.part")
     writer: _Writer | None = None

@@ -1,4 +1,4 @@
-"""What a clone predicts of a whole match, cycle by cycle, as one table."""
+"""A clone's predictions for a whole match, cycle by cycle, as one table."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KICK_M = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchColumns:
-    """What a prediction needs of a match, from its logs or from a store.
+    """The columns of a match that a prediction needs, from its logs or from a store.
 
     Attributes:
         match_id: of the match. left, right: names of the teams, None for an empty side.
@@ -52,7 +52,7 @@ class MatchColumns:
 
     @classmethod
     def of(cls, match: Match) -> MatchColumns:
-        """Return those of a match that was read from its logs."""
+        """Return the columns of a match that was read from its logs."""
         return cls(
             match_id=match.match_id,
             left=match.left.name,
@@ -65,7 +65,7 @@ class MatchColumns:
         )
 
     def side_of(self, team: str | None, side: str | None) -> int:
-        """Return which side is meant, 1 left or -1 right.
+        """Return the side that ``team`` or ``side`` names, 1 left or -1 right.
 
         Raises:
             UsageError: neither or both are named, or the team does not play.
@@ -91,7 +91,7 @@ class PredictionTable:
     Columns: ``match_id``, ``frame`` (index into the log's frames), ``cycle``, ``stoppage``, ``playmode``, ``team``,
     ``side``, ``unum``; ``p_dash``, ... the probability of each command; ``likeliest``, the command with the greatest;
     ``dash_power``, ... the likeliest parameters of each command, if it were given, in power, degrees and metres, those
-    of kicks and tackles null for players who cannot reach the ball; ``done``, the command that the log has, null where
+    of kicks and tackles null for players that cannot reach the ball; ``done``, the command that the log has, null where
     it has none that the model knows; ``executed``, whether the server carried it out; ``done_dash_power``, ... its
     parameters; ``log_loss`` of the command, nats; ``parameter_log_loss``, -ln of the density of its parameters, null
     for a model that has none.
@@ -208,7 +208,7 @@ def _table(
     side: int,
     commands: tuple[str, ...],
 ) -> pa.Table:
-    """Return the columns of `PredictionTable`; ``asked`` (n,) says whose kicks and tackles were predicted."""
+    """Return the columns of `PredictionTable`; ``asked`` (n,): kicks and tackles were predicted there."""
     probabilities, likeliest, parameter_log_loss = answer
     parameters = parameters_of(commands)
     unknown = done.kind < 0
@@ -243,7 +243,7 @@ def _table(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Done:
-    """What the players of some rows did.
+    """The true commands of some rows.
 
     Attributes:
         kind: (n,) int64 index into the model's commands, -1 where the log has none of them.
@@ -281,7 +281,7 @@ def _done(
     place = np.full((len(match.frames["cycle"]), N_TEAM), -1)
     place[frame, actor] = np.arange(len(frame))
     row = place[cleaned.kept[samples["frame"]], samples["player"]]
-    # A command of a player whom the log has off the field has no row.
+    # A command of a player that the log has off the field has no row.
     here = row >= 0
     row = row[here]
     kind, executed = np.full(len(frame), -1, np.int64), np.zeros(len(frame), np.bool_)
@@ -302,7 +302,7 @@ def _check(
     frame: NDArray[np.int64],
     channels: tuple[str, ...],
 ) -> None:
-    """See that the frames hold what the model reads, and the types of all players.
+    """Raise unless the frames hold all that the model reads, and the types of all players.
 
     Raises:
         DatasetError: they do not.

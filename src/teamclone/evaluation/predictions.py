@@ -1,4 +1,4 @@
-"""``Predictions``: a model's answers beside what happened, as arrays. Everything in evaluation is computed from it."""
+"""``Predictions``: a model's answers beside the true commands, as arrays; the input of all figures."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Predictions:
         probabilities: (n, commands).
         parameters: (n, parameters) predicted `parameters_of` the commands, in power, degrees and metres.
         parameter_log_loss: (n,) -ln of the likelihood of the given command's parameters, nats, per unit of power and
-            degree, square metre of a move; NaN from what answers with points, and of commands without parameters.
+            degree, square metre of a move; NaN from heads without a density, and of commands without parameters.
         kind: (n,) the command given, index into ``commands``.
         issued: (n, parameters) those of the command given; NaN for those of other commands.
         last: (n,) the player's last executed command as an index into ``commands``; -1 for none of them.
         match: (n,) index of the match.
-        position: (n, 2) where the player stood, metres, his team attacking +x.
-        mode: (n,) play mode as of `State`; None where all is play_on.
+        position: (n, 2) the actor's position, metres, its team attacking +x.
+        mode: (n,) the PlayMode as if the actor's team were the left one; None where all is play_on.
         commands: some of REPERTOIRE.
     """
 
@@ -44,7 +44,7 @@ class Predictions:
         return len(self.kind)
 
     def rows(self, index: NDArray[np.integer] | NDArray[np.bool_]) -> Predictions:
-        """The outcome of some rows only, by boolean mask or by number."""
+        """Return the outcome of some rows only, by boolean mask or by number."""
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
         some: dict[str, Any] = {name: of[index] for name, of in columns.items() if isinstance(of, np.ndarray)}
         return replace(self, **some)

@@ -1,4 +1,4 @@
-"""One HTML file that tells how good a clone is: readable without a network, on paper, in the light and in the dark."""
+"""One HTML file that shows how good a clone is: without a network, on paper, in light and dark mode."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SPLIT_NAMES = {
 }
 FIGURES = (
     ("accuracy", "accuracy", "share of commands predicted right"),
-    ("cross_entropy", "cross-entropy, nats", "surprise at what was done; lower is better"),
+    ("cross_entropy", "cross-entropy, nats", "surprise at the true commands; lower is better"),
     ("brier", "Brier score", "squared error of the probabilities, 0 to 2; lower is better"),
     ("ece", "calibration error", "gap between confidence and accuracy; lower is better"),
     ("balanced_accuracy", "balanced accuracy", "mean recall of the commands"),
@@ -42,22 +42,22 @@ PERCENT = {"accuracy", "balanced_accuracy", "ece"}
 
 
 def percent(value: float | None, digits: int = 1) -> str:
-    """0.8455 as ``84.6 %``; what is undefined as a dash."""
+    """Return 0.8455 as ``84.6 %``; an undefined value as a dash."""
     return NOTHING if value is None else f"{number(100 * value, digits)}\N{NARROW NO-BREAK SPACE}%"
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with so many decimals, thousands grouped; what is undefined as a dash."""
+    """Return a number with so many decimals, thousands grouped; an undefined value as a dash."""
     return NOTHING if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def points(value: float | None, digits: int = 1) -> str:
-    """A difference of accuracies, 0.012 as ``+1.2``."""
+    """Return a difference of accuracies, 0.012 as ``+1.2``."""
     return NOTHING if value is None else f"{100 * value:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 3) -> Markup:
-    """A figure and, small beside it, its interval."""
+    """Return a figure and, small beside it, its interval."""
     if value is None or value["value"] is None:
         return Markup(NOTHING)
     write = {"percent": percent, "number": number, "points": points}[kind]
@@ -71,24 +71,24 @@ def figure(value: Mapping[str, Any] | None, kind: str = "number", digits: int = 
 
 
 def split_by_rows(evaluation: Mapping[str, Any]) -> bool:
-    """Whether rows of one match stand on both sides, as in the paper."""
+    """Return whether rows of one match are in several splits, as in the paper."""
     return str((evaluation["dataset"]["options"] or {}).get("split")) == "rows"
 
 
 def primary_split(evaluation: Mapping[str, Any]) -> str:
-    """The split the headline speaks of: test, or the next best there is."""
+    """Return the split of the headline: test, or the next best there is."""
     there = evaluation["splits"]
     return next(name for name in ("test", "unseen", "validation", "train") if name in there)
 
 
 def best_epoch(history: Sequence[Mapping[str, Any]]) -> int | None:
-    """The epoch of the lowest validation loss."""
+    """Return the epoch of the lowest validation loss."""
     known = [row for row in history if row.get("validation_loss") is not None]
     return int(min(known, key=lambda row: row["validation_loss"])["epoch"]) if known else None
 
 
 def sentences(evaluation: Mapping[str, Any]) -> list[str]:
-    """What the numbers say, in words; every claim depends on them."""
+    """Return the main findings as sentences; each claim depends on the figures."""
     name = primary_split(evaluation)
     section = evaluation["splits"][name]
     team, model, others = evaluation["dataset"]["team"], section["model"], section["baselines"]
@@ -109,14 +109,14 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
     if model["accuracy"]["low"] is not None:
         low = percent(model["accuracy"]["low"]).removesuffix("\N{NARROW NO-BREAK SPACE}%")
         text += f" (95 % interval {low} to {percent(model['accuracy']['high'])})"
-    said = [f"{text}."]
+    found = [f"{text}."]
 
     persistence, majority = others["persistence"], others["majority"]
-    said.append(
+    found.append(
         f"Repeating the player's last command would be right {percent(persistence['accuracy']['value'])} of the time, "
-        f"always saying the most frequent one {percent(majority['accuracy']['value'])}."
+        f"always predicting the most frequent one {percent(majority['accuracy']['value'])}."
     )
-    said.append(verdict(section))
+    found.append(verdict(section))
 
     unseen = evaluation["splits"].get("unseen")
     if unseen is not None and name == "test":
@@ -127,15 +127,15 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
             if abs(difference) < 0.05
             else f"{abs(difference):.1f} points {'more' if difference > 0 else 'less'}"
         )
-        said.append(
+        found.append(
             f"Against {names}, never met in training, it is right {percent(unseen['model']['accuracy']['value'])} "
             f"of the time, {how}."
         )
-    return said
+    return found
 
 
 def verdict(section: Mapping[str, Any]) -> str:
-    """Whether the clone beats the strongest rule, by accuracy and else by its probabilities."""
+    """Return whether the clone beats the strongest rule, by accuracy and else by its probabilities."""
     others = section["baselines"].values()
     gain = max(others, key=lambda other: other["accuracy"]["value"])["accuracy_gain"]
     if (gain["value"] if gain["low"] is None else gain["low"]) > 0:
@@ -150,14 +150,14 @@ def verdict(section: Mapping[str, Any]) -> str:
 
 
 def listing(names: Sequence[str], most: int = 4) -> str:
-    """Some names in a sentence."""
+    """Join some names for a sentence."""
     if len(names) > most:
         return f"{', '.join(names[:most])} and {len(names) - most} more"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Accuracy of rules and clone as rows, the best last, and the paper's for orientation."""
+    """Return the accuracy of rules and clone as rows, the best last, and the paper's for orientation."""
     section = evaluation["splits"][primary_split(evaluation)]
     names = {"majority": "most frequent command", "persistence": "repeat the last command", "markov": "Markov table"}
     rows = [
@@ -171,7 +171,7 @@ def ladder(evaluation: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def calibration_sentence(section: Mapping[str, Any]) -> str:
-    """What the confidence means, at the most confident bin and at the least."""
+    """Return a sentence on calibration, at the most and at the least confident bin."""
     curve = section["calibration"]["predicted_command"]
     if not curve["confidence"]:
         return ""
@@ -184,7 +184,7 @@ def calibration_sentence(section: Mapping[str, Any]) -> str:
 
 
 def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
-    """The commands that lead from match logs to this report; what the record does not know stands in capitals."""
+    """Return the commands that lead from match logs to this report; unknown arguments are in capitals."""
     data, run = evaluation["dataset"], evaluation["run"]
     options = data["options"] or {}
     build = ["teamclone dataset --store STORE", *(f"--team {shlex.quote(team)}" for team in data["teams"])]
@@ -211,7 +211,7 @@ def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
 
 
 def _wrapped(parts: Sequence[str], width: int = 88) -> str:
-    """A long command over several lines, as a shell takes it."""
+    """Return a long command over several lines, as a shell takes it."""
     lines = [""]
     for part in parts:
         if lines[-1] and len(lines[-1]) + len(part) >= width:
@@ -227,7 +227,7 @@ def make_report(
     quick_predictions: int = 2000,
     on_progress: Callable[[str, int, int], None] | None = None,
 ) -> Path:
-    """Write the report of a run; what it needs and the run lacks is computed first.
+    """Write the report of a run; missing parts are computed first.
 
     RUN/evaluation.json is made if it is missing or belongs to other weights, RUN/bench.json likewise, with fewer
     predictions than `teamclone bench` takes.
@@ -236,7 +236,7 @@ def make_report(
         run: the run.
         out: the file; None is RUN/report.html.
         quick_predictions: how many single predictions are timed if none were.
-        on_progress: called with the name of the work, what is done and what there is in all.
+        on_progress: called with the name of the work, the steps done and their number.
 
     Returns:
         The file.
@@ -265,7 +265,7 @@ def make_report(
 
 
 def fresh_evaluation(run: Run) -> dict[str, Any] | None:
-    """The saved evaluation, if it speaks of the weights and the dataset that the run has now."""
+    """Return the saved evaluation, if it is of the run's present weights and dataset."""
     try:
         evaluation = load_evaluation(run.path / "evaluation.json")
         weights = model_id(run.load_model(evaluation["run"]["checkpoint"]))
@@ -276,7 +276,7 @@ def fresh_evaluation(run: Run) -> dict[str, Any] | None:
 
 
 def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
-    """The saved response times, if they are of these weights."""
+    """Return the saved response times, if they are of these weights."""
     try:
         bench = load_bench(run.path / "bench.json")
         return bench if bench["model_id"] == model_id(run.load_model(checkpoint)) else None
@@ -293,7 +293,7 @@ def trained_error(config: Config) -> str:
 
 
 def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, history: Sequence[Any]) -> dict[str, Markup]:
-    """The figures by name; those without data are missing."""
+    """Return the figures by name; those without data are missing."""
     data, splits = evaluation["data"], evaluation["splits"]
     team = evaluation["dataset"]["team"]
     kinds = tuple(data["positions"])
@@ -318,7 +318,7 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
         ),
         "reliability": (
             figures.reliability(splits[primary_split(evaluation)]["calibration"]),
-            "Two reliability diagrams: share that came true against probability said; the diagonal is perfect",
+            "Two reliability diagrams: share that came true against predicted probability; the diagonal is perfect",
         ),
     }
     compared = {name: split["model"] for name, split in splits.items()}
@@ -354,7 +354,7 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
 def render(
     run: Run, evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, *, history: Sequence[Mapping[str, Any]]
 ) -> str:
-    """The report as HTML.
+    """Return the report as HTML.
 
     Args:
         run: the run; its settings are shown.

@@ -26,9 +26,9 @@ _MAY_MOVE[list(MOVE_MODES)] = True
 
 
 def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, has_stoppage: bool) -> NDArray[np.int32]:
-    """Index of the frame of each (cycle, stoppage), shape of ``cycle``; -1 where there is none.
+    """Return the index of the frame of each (cycle, stoppage), shape of ``cycle``; -1 where there is none.
 
-    Without stoppage counters (servers 12.x) a stamp inside a stoppage cannot be told from its neighbours: -1.
+    Without stoppage counters (servers 12.x) stamps inside a stoppage are ambiguous: -1.
     """
     keys = frames["cycle"].astype(np.int64) * _STOPPAGES + frames["stoppage"]
     if not len(keys) or not len(cycle):
@@ -49,14 +49,17 @@ def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, ha
 
 
 def slot_of(side: NDArray[Any], unum: NDArray[Any]) -> NDArray[np.int64]:
-    """Place on the player axis: 0..10 the left team's numbers 1..11, 11..21 the right team's; -1 for a coach."""
+    """Return the place on the player axis.
+
+    0..10 are the left team's numbers 1..11, 11..21 the right team's; -1 is a coach.
+    """
     slot: NDArray[np.int64] = unum.astype(np.int64) - 1 + np.where(side < 0, N_TEAM, 0)
     slot[(unum == 0) | (side == 0)] = -1
     return slot
 
 
 def body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Indices of the players' commands that would take a body slot of their frame if it were free, in log order.
+    """Return indices of the players' commands that would take a free body slot of their frame, in log order.
 
     A ``move`` in a play mode that does not allow it leaves the slot free, an invalid command never takes it. The
     arguments are those of ``first_body_commands``.
@@ -72,7 +75,7 @@ def body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.
 
 
 def first_body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Indices of the commands that take the body slot: the first of each frame and player (rcssserver ``player.cpp``).
+    """Return indices of the commands that take the body slot: the first of each frame and player (``player.cpp``).
 
     Args:
         commands: with ``frame``, ``side``, ``unum``, ``kind``, ``valid``, in log order.
@@ -87,7 +90,7 @@ def first_body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArr
 
 
 def follows(frames: Columns) -> NDArray[np.bool_]:
-    """Whether the next frame is the next step of the simulator, shape (n_frames,); False for the last frame.
+    """Return whether the next frame is the next step of the simulator, shape (n_frames,); False for the last frame.
 
     At half time, and where a damaged log lost frames, the counters of the next frame speak of several cycles.
     """
@@ -98,11 +101,11 @@ def follows(frames: Columns) -> NDArray[np.bool_]:
 
 
 def executed_kind(frames: Columns, players: Columns) -> NDArray[np.uint8]:
-    """The body command that the server executed on each frame, by the counters of the next one.
+    """Return the body command that the server executed on each frame, by the counters of the next one.
 
     Returns:
         (n_frames, 22) CommandKind ids, 0 for none; a frame without a direct successor has none. Where a kick and a
-        two-leg dash were both executed the kick is named.
+        two-leg dash were both executed it is the kick.
     """
     kinds: NDArray[np.uint8] = np.zeros(players["state"].shape, np.uint8)
     # Written last wins: kick goes above dash.
@@ -125,12 +128,12 @@ def executed_commands(
     Args:
         players: ``columns.PLAYERS`` with the counters, (n_frames, 22).
         frame: (n,) the frame that each command was decided on, which has a successor.
-        slot: (n,) as `slot_of` gives it. kind: (n,) CommandKind ids of BODY_KINDS.
+        slot: (n,) see `slot_of`. kind: (n,) CommandKind ids of BODY_KINDS.
     """
     rose = np.zeros(len(frame), np.bool_)
     for one in np.unique(kind):
         of_kind = kind == one
-        at, who = frame[of_kind], slot[of_kind]
+        at, place = frame[of_kind], slot[of_kind]
         counter = players[counter_name(CommandKind(one))]
-        rose[of_kind] = counter[at + 1, who] > np.maximum(counter[at, who], 0)
+        rose[of_kind] = counter[at + 1, place] > np.maximum(counter[at, place], 0)
     return rose

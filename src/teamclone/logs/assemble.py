@@ -1,4 +1,4 @@
-"""What every reader of game logs does alike: stoppage counter, play modes and scores by frame, teams, player types.
+"""Steps that all readers of game logs share: stoppage counter, play modes, scores, teams, player types.
 
 A log states the play mode and the teams only when they change, before the first frame they hold for. Readers collect
 these statements as *marks*, each with the index of the frame that follows it.
@@ -39,7 +39,7 @@ MAX_SCORE = 32767
 
 
 def stoppage_of(cycle: NDArray[np.int32]) -> NDArray[np.int32]:
-    """How often each cycle was seen just before: ``[7 7 7 8]`` gives ``[0 1 2 0]``. Shape (n_frames,).
+    """Return how often each cycle was seen just before: ``[7 7 7 8]`` gives ``[0 1 2 0]``. Shape (n_frames,).
 
     Text and binary logs do not write the stoppage counter, but show the frames of a stopped clock one by one.
     """
@@ -52,7 +52,7 @@ def stoppage_of(cycle: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def fill_marks(n_frames: int, marks: Sequence[tuple[int, tuple[int, ...]]], width: int) -> NDArray[np.int64]:
-    """Values of each frame, shape (n_frames, width): those of the last mark at or before it, zeros before the first.
+    """Return the values of each frame, (n_frames, width): those of the last mark at or before it, else zeros.
 
     Args:
         marks: (frame index, ``width`` values), by ascending frame. Marks after the last frame change nothing.
@@ -73,7 +73,7 @@ def frame_columns(
     teams: Sequence[TeamMark],
     stoppage: NDArray[np.int32] | None = None,
 ) -> Columns:
-    """The columns ``columns.FRAMES``.
+    """Return the columns ``columns.FRAMES``.
 
     Args:
         cycle: shape (n_frames,).
@@ -96,7 +96,7 @@ def frame_columns(
 
 
 def limited_score(value: float) -> int:
-    """Return a score or count of penalties as its column can hold it, whatever a damaged log says.
+    """Return a score or count of penalties limited to its column's range, for damaged logs.
 
     Raises:
         ValueError: it is not a number.
@@ -107,7 +107,10 @@ def limited_score(value: float) -> int:
 
 
 def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:
-    """Left and right team with the last score of the log. A name once stated stays, whatever later marks leave out."""
+    """Return the left and right team with the last score of the log.
+
+    A name once stated stays, even if later marks leave it out.
+    """
     left = next((mark.left for mark in reversed(marks) if mark.left is not None), None)
     right = next((mark.right for mark in reversed(marks) if mark.right is not None), None)
     last = marks[-1].scores if marks else (0, 0, 0, 0, 0, 0)
@@ -118,7 +121,7 @@ def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:
 
 
 def checked_type(fields: Mapping[str, float | str]) -> tuple[int, dict[str, float]]:
-    """Number (``id``) and known parameters of a player type.
+    """Return the number (``id``) and the known parameters of a player type.
 
     Raises:
         ValueError: the number is not in 0..255, or a parameter is no finite number.
@@ -134,7 +137,7 @@ def checked_type(fields: Mapping[str, float | str]) -> tuple[int, dict[str, floa
 
 
 def player_type_columns(types: Mapping[int, Mapping[str, float]]) -> Columns:
-    """The columns of ``player_types.FIELDS``, row = type id; what a log leaves out gets the server's default."""
+    """Return the columns of ``player_types.FIELDS``, row = type id; missing values are the server's defaults."""
     made = default_player_types(max(types, default=-1) + 1)
     for row, fields in types.items():
         for name, value in fields.items():

@@ -56,7 +56,7 @@ COUNTERS = (
 
 
 def counter_name(kind: CommandKind) -> str:
-    """The column that counts the executed commands of a kind: ``count_dash``."""
+    """Return the column that counts the executed commands of a kind: ``count_dash``."""
     return f"count_{kind.name.lower()}"
 
 
@@ -81,8 +81,8 @@ PLAYERS = (
     _column("effort", "float32", "", "dash efficiency; NaN where the version lacks it"),
     _column("recovery", "float32", "", "stamina recovery rate; NaN where the version lacks it"),
     _column("capacity", "float32", "stamina", "stamina left to recover; NaN before text version 5"),
-    _column("attention_side", "int8", "", "side of the player listened to: 1 left, -1 right, 0 nobody"),
-    _column("attention_unum", "uint8", "", "number of the player listened to; 0 nobody"),
+    _column("attention_side", "int8", "", "side of the player listened to: 1 left, -1 right, 0 none"),
+    _column("attention_unum", "uint8", "", "number of the player listened to; 0 none"),
     *(
         _column(
             counter_name(kind),

@@ -1,4 +1,4 @@
-"""Bytes of a log: from a path or a stream, plain or compressed, told apart by their first bytes."""
+"""Bytes of a log: from a path or a stream, plain or compressed; the first bytes show which."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MAX_BYTES = 1 << 30
 
 
 class _Inflater(Protocol):
-    """What zlib, lzma and zstandard objects have in common."""
+    """The interface that zlib, lzma and zstandard decompressors have in common."""
 
     @property
     def eof(self) -> bool: ...
@@ -40,10 +40,10 @@ class _Packing:
     Attributes:
         magic: its first bytes.
         inflater: makes a decompressor of one member.
-        chunk: how many bytes to inflate in one step. What they can become at most is what a bomb costs before it is
-            met: about 64 MiB (gzip makes up to 1032 bytes of one, xz 7000, zstd 32000). What follows an error in a
-            chunk is lost.
-        careful: inflates what this one cannot.
+        chunk: how many bytes to inflate in one step, chosen so that they become at most about 64 MiB before a bomb is
+            noticed (gzip makes up to 1032 bytes of one, xz 7000, zstd 32000). The bytes behind an error in a chunk are
+            lost.
+        careful: another inflater, for streams that this one cannot inflate.
     """
 
     magic: bytes
@@ -63,13 +63,13 @@ _PACKINGS = (
 )
 _ERRORS: tuple[type[Exception], ...] = (zlib.error, lzma.LZMAError, zstandard.ZstdError, EOFError)
 if isal_zlib is not None:
-    _ERRORS += (cast(type[Exception], isal_zlib.IsalError),)  # its stub says it is an instance
+    _ERRORS += (cast(type[Exception], isal_zlib.IsalError),)  # its stub has it as an instance
 
 
 def read_bytes(
     source: Path | BinaryIO, *, path: Path | None = None, max_bytes: int = MAX_BYTES
 ) -> tuple[bytes, str | None]:
-    """The decompressed content of a log, as far as it can be had.
+    """Return the decompressed content of a log, as far as it can be had.
 
     Args:
         source: a file, or a binary stream at its beginning.
@@ -77,7 +77,7 @@ def read_bytes(
         max_bytes: refuse more than this after decompression.
 
     Returns:
-        The bytes, and what broke off the decompression: None where it went to the end.
+        The bytes, and the error that broke off the decompression: None where it went to the end.
 
     Raises:
         LogError: nothing could be read, or there is more than ``max_bytes``.
@@ -103,7 +103,7 @@ def read_bytes(
 
 
 def _inflate(raw: bytes, packing: _Packing, *, path: Path | None, max_bytes: int) -> tuple[bytes, str | None]:
-    """Inflates all members of a stream in chunks, so that a bomb is met before it fills the memory."""
+    """Inflate all members of a stream in chunks, so that a bomb is met before it fills the memory."""
     content = io.BytesIO()  # grows in place, where joining pieces would need the memory twice
     problem = None
     inflater = packing.inflater()

@@ -1,4 +1,4 @@
-"""``Match``: one match as NumPy columns, and what was wrong with its files."""
+"""``Match``: one match as NumPy columns, and the problems of its files."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Team:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GameLog:
-    """What a game log (.rcg) says, in any of its versions.
+    """The content of a game log (.rcg), in any of its versions.
 
     Attributes:
         log_version: ``"1"`` .. ``"6"`` or ``"json-17"``, ``"json-18"``, ``"json-19"``.
@@ -82,7 +82,7 @@ class GameLog:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandLog:
-    """What a command log (.rcl) says.
+    """The content of a command log (.rcl).
 
     Attributes:
         commands: the columns ``columns.COMMANDS`` plus ``text_start`` and ``text_stop`` (int64 offsets into ``text``).
@@ -120,10 +120,12 @@ class Match:
 
     @property
     def left(self) -> Team:
+        """The left team, see ``GameLog.left``."""
         return self.game.left
 
     @property
     def right(self) -> Team:
+        """The right team, see ``GameLog.right``."""
         return self.game.right
 
     @property
@@ -148,10 +150,15 @@ class Match:
 
     @property
     def event_texts(self) -> tuple[str, ...]:
+        """The words of the events, (n_events,); empty without a command log."""
         return self.log.event_texts if self.log is not None else ()
 
     def command_text(self, index: int) -> str:
-        """What a command says besides numbers: the payload of ``say``, ``our 9`` of ``attentionto``; else empty."""
+        """Return the text of a command: the payload of ``say``, ``our 9`` of ``attentionto``; else empty.
+
+        Raises:
+            IndexError: there is no command ``index``.
+        """
         if self.log is None:
             raise IndexError(index)
         start, stop = self.log.commands["text_start"][index], self.log.commands["text_stop"][index]
@@ -159,7 +166,10 @@ class Match:
 
 
 def empty_columns(spec: tuple[columns.Column, ...], *shape: int) -> Columns:
-    """Columns of a spec filled with "not in this log": NaN, -1 of the counters, 255 of ``view_quality``, else 0."""
+    """Return columns of a spec, filled with "not in this log".
+
+    That is NaN, -1 of the counters, 255 of ``view_quality``, else 0.
+    """
     made: Columns = {}
     for column in spec:
         dtype = np.dtype(column.dtype)
@@ -173,5 +183,5 @@ def empty_columns(spec: tuple[columns.Column, ...], *shape: int) -> Columns:
 
 
 def default_player_types(n_types: int) -> Columns:
-    """``n_types`` copies of the server's default type, float64."""
+    """Return ``n_types`` copies of the server's default type, float64."""
     return {name: np.full(n_types, value, np.float64) for name, value in types_of.DEFAULTS.items()}

@@ -1,7 +1,7 @@
 """Binary game logs: versions 1, 2 and 3 of servers before 12, which later servers still write on request.
 
 Big endian C structs with the padding of x86 (rcssserver `types.h`, `dispsender.cpp`). A record is an int16 mode and
-what the mode says; frames are gathered by their offsets and decoded at once.
+the struct of that mode; frames are gathered by their offsets and decoded at once.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ _SHORT_SHOWINFO_T2 = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class _Parameters:
-    """Where the parameters stand in a struct, and how they are scaled; built by ``_parameters``."""
+    """The places and scales of the parameters in a struct; built by ``_parameters``."""
 
     dtype: np.dtype[np.void]
     scales: dict[str, float]
@@ -183,7 +183,7 @@ _PLAUSIBLE = {
     "foul_detect_probability": (0.0, 1.0),
     "catchable_area_l_stretch": (1.0, 10.0),
 }
-"""Bounds of the later parameters of a type; values outside them are what happened to be in a converter's memory."""
+"""Bounds of the later parameters of a type; values outside them are garbage from a converter's memory."""
 
 _DRAWINFO_SIZE = 74
 _SIZES: dict[int, dict[int, int]] = {
@@ -207,7 +207,7 @@ _V1_RECORD = 2052
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Record:
-    """``frame`` is the index of the frame that follows, ``start`` and ``stop`` bound what stands behind the mode."""
+    """``frame`` is the index of the frame that follows, ``start`` and ``stop`` bound the bytes behind the mode."""
 
     mode: int
     frame: int
@@ -258,7 +258,7 @@ def read_binary(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:
-    """Version 1: records of one length."""
+    """Cut version 1: records of one length."""
     found = _Records()
     for start in range(0, len(data) - _V1_RECORD + 1, _V1_RECORD):
         mode = struct.unpack_from(">h", data, start)[0]
@@ -274,7 +274,7 @@ def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:
 
 
 def _cut(data: bytes, *, version: int, path: Path | None) -> _Records:
-    """Versions 2 and 3: the mode tells the length."""
+    """Cut versions 2 and 3: a record's mode gives its length."""
     found = _Records()
     position = 4
     while position < len(data):
@@ -300,7 +300,7 @@ def _cut(data: bytes, *, version: int, path: Path | None) -> _Records:
 
 
 def _unknown(mode: int, *, path: Path | None, byte: int) -> Problem:
-    text = f"unknown record mode {mode}; what follows cannot be read and is left out"
+    text = f"unknown record mode {mode}; the rest of the file cannot be read and is left out"
     return Problem(code="bad-record", severity=Severity.ERROR, text=text, path=path, byte=byte)
 
 
@@ -310,7 +310,7 @@ def _truncated(data: bytes, *, path: Path | None, byte: int) -> Problem:
 
 
 def _gather(data: bytes, offsets: list[int], dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """The structs at these offsets, shape (n,)."""
+    """Return the structs at these offsets, shape (n,)."""
     index = np.array(offsets, np.int64)[:, None] + np.arange(dtype.itemsize)
     structs: NDArray[np.void] = np.frombuffer(data, np.uint8)[index].view(dtype)[:, 0]
     return structs

@@ -67,7 +67,7 @@ def _limits(dtype: np.dtype[Any]) -> tuple[float, float]:
 _LOWEST, _HIGHEST = np.array(
     [_limits(np.dtype(column.dtype)) for name in _COLUMNS for column in columns.PLAYERS if column.name == name]
 ).T
-"""What the columns hold, shapes (n_columns,). Nothing that a server writes comes near."""
+"""The range of each column, shapes (n_columns,). No value that a server writes comes near its ends."""
 _QUALITY = {"l": 0, "h": 1}
 _SIDE = {"l": 1, "r": -1}
 _SLOT = {"l": -1, "r": N_TEAM - 1}
@@ -96,7 +96,7 @@ def read_json(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _records(data: bytes, *, start: int, first_line: int, reader: _Reader) -> Iterator[tuple[int | None, Any]]:
-    """(line, record) of each record; the line is None where the array is not written one record a line."""
+    """Yield (line, record) of each record; the line is None where there is not one record a line."""
     lines = data[start:].splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
@@ -134,7 +134,7 @@ def _whole_array(text: bytes) -> list[Any] | None:
 
 @dataclass(slots=True, kw_only=True)
 class _Reader:
-    """What was read so far. The values of all players and frames stand in arrays from the start."""
+    """The content read so far. The values of all players and frames stand in arrays from the start."""
 
     path: Path | None
     capacity: int
@@ -167,7 +167,7 @@ class _Reader:
         self.problems.append(Problem(code=code, severity=Severity.WARNING, text=text, path=self.path, line=line))
 
     def take(self, record: Any, *, line: int | None) -> None:
-        """Take one record in; one that is not as it should be becomes a problem."""
+        """Take one record in; a bad one becomes a problem."""
         try:
             kind, body = _open(record)
             self._take(kind, body, line=line)
@@ -213,7 +213,7 @@ class _Reader:
         ]
         found = np.array(values, np.float64)
         if ((found < _LOWEST) | (found > _HIGHEST)).any() or np.abs(ball).max() > _HIGHEST.max():
-            raise ValueError("a number beyond what its column holds")
+            raise ValueError("a number beyond the range of its column")
         frame = self.n_frames
         self.cycle[frame] = show["time"]
         self.stoppage[frame] = show.get("stime", 0)
@@ -238,7 +238,7 @@ class _Reader:
                 Problem(
                     code="truncated",
                     severity=Severity.WARNING,
-                    text="the file ends before its closing ]; what was written is kept",
+                    text="the file ends before its closing ]; the records before it are kept",
                     path=self.path,
                     line=self.truncated_at,
                     cycle=int(self.cycle[n_frames - 1]),
@@ -267,7 +267,7 @@ class _Reader:
 
 
 def _open(record: Record) -> tuple[str, Any]:
-    """Kind and content of a record of either shape."""
+    """Return the kind and content of a record of either shape."""
     if "type" in record:
         return record["type"], record
     ((kind, body),) = record.items()
@@ -299,6 +299,6 @@ def _team_mark(frame: int, body: Record) -> TeamMark:
 
 
 def _params(body: Record) -> dict[str, float | str]:
-    """Numbers and booleans as float, the rest as text."""
+    """Return numbers and booleans as float, the rest as text."""
     fields = body.get("params", body)
     return {name: value if isinstance(value, str) else float(value) for name, value in fields.items()}

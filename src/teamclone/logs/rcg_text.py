@@ -36,7 +36,7 @@ _WHAT = {
 
 
 def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
-    """Reads a text game log.
+    """Read a text game log.
 
     Args:
         data: the decompressed log; begins with ``ULG4``, ``ULG5`` or ``ULG6``.
@@ -134,7 +134,7 @@ def _team_mark(frame: int, match: re.Match[bytes]) -> TeamMark:
 
 
 def parameters(line: bytes) -> dict[str, float | str]:
-    """Names and values of ``(server_param (name value)(name value)...)``; true and false become 1 and 0."""
+    """Parse ``(server_param (name value)(name value)...)``; true and false become 1 and 0."""
     values: dict[str, float | str] = {}
     for name, text, bare in _PARAMETER.findall(line, 1):
         if bare in {b"true", b"false"}:
@@ -148,16 +148,20 @@ def parameters(line: bytes) -> dict[str, float | str]:
 
 
 def _pieces(buffer: NDArray[np.uint8]) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-    """The log in pieces that stay in the processor's cache, each with its place; of all at once a test makes a copy."""
+    """Yield the log in pieces that stay in the processor's cache, each with its place.
+
+    A test of all at once would make a copy.
+    """
     return ((at, buffer[at : at + _PIECE]) for at in range(0, len(buffer), _PIECE))
 
 
 def count_byte(buffer: NDArray[np.uint8], byte: int) -> int:
+    """Return how often a byte occurs."""
     return sum(int(np.count_nonzero(piece == byte)) for _, piece in _pieces(buffer))
 
 
 def line_bounds(buffer: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where each line begins and ends (without its newline), shapes (n_lines,)."""
+    """Return where each line begins and ends (without its newline), shapes (n_lines,)."""
     newlines = [np.flatnonzero(piece == ord("\n")) + at for at, piece in _pieces(buffer)]
     stops = np.concatenate([*newlines, [len(buffer)]])
     starts = np.concatenate([[0], stops[:-1] + 1])
@@ -187,7 +191,7 @@ def _scan(
     *,
     path: Path | None,
 ) -> tuple[Columns, Columns, NDArray[np.bool_]]:
-    """Frames of the show lines: cycle and ball, player columns, and which lines were good."""
+    """Scan the show lines: cycle and ball, player columns, and which lines were good."""
     n = len(starts)
     shows = read_shows(buffer, starts, stops)
     good = shows.outcomes == scan.OK

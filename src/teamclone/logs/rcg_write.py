@@ -29,8 +29,8 @@ _STAMINA = ("stamina", "effort", "recovery", "capacity")
 def write_text(log: Match | GameLog, file: BinaryIO, *, version: TextVersion = 6) -> None:
     """Write a game log as text. Reading it back gives the same columns, at 6 significant digits as the server prints.
 
-    What the version has no place for is left out: the capacity before 5, the focus before 6, and in all of them the
-    stoppage counter, which a reader counts anew.
+    Columns that the version has no place for are left out: the capacity before 5, the focus before 6, and in all of
+    them the stoppage counter, which a reader counts anew.
 
     Raises:
         UsageError: the log lacks columns that the version writes for every player, as older versions do.
@@ -44,7 +44,7 @@ def write_text(log: Match | GameLog, file: BinaryIO, *, version: TextVersion = 6
 
 
 def _columns_of(version: TextVersion) -> tuple[str, ...]:
-    """The columns that the version writes for every player; arm and attention are written only while they are used."""
+    """Return the columns that the version writes for every player; arm and attention are there only while used."""
     counters = [columns.counter_name(kind) for kind in columns.COUNTERS]
     if version < 6:
         counters.remove(columns.counter_name(CommandKind.CHANGE_FOCUS))
@@ -83,7 +83,7 @@ def _parameters(values: Mapping[str, float | str]) -> str:
 
 
 def _number(value: float) -> str:
-    """Whole numbers in full, as the server prints its integers; the rest as a C++ stream does."""
+    """Format whole numbers in full, like the server's integers; the rest like a C++ stream."""
     return f"{value:.0f}" if value.is_integer() else f"{value:g}"
 
 
@@ -133,7 +133,7 @@ def _team_line(game: GameLog, cycle: int, scores: tuple[int, ...]) -> str:
 
 
 def _tail(game: GameLog) -> Iterator[str]:
-    """What the server writes when it closes a log. The date of the match is not in our columns."""
+    """Return the server's last line of a log. The date of the match is not in our columns."""
     if not game.complete or not len(game.frames["cycle"]):
         return
     cycle = int(game.frames["cycle"][-1])

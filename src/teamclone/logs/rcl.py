@@ -1,4 +1,4 @@
-"""Command logs: what every client sent, as the server received it."""
+"""Command logs: the messages of all clients, as the server received them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from teamclone.logs.match import Columns, CommandLog, Problem, Severity, empty_c
 from teamclone.logs.rcg_text import count_byte, line_bounds
 
 FIRST_LINE = re.compile(rb"\s*\d{1,9}(,\d{1,9})?\t")
-"""What a command log begins with."""
+"""The first bytes of a command log."""
 _SENDER = re.compile(rb"^\d+(?:,\d+)?\tRecv (\S+)_(?:\d{1,2}|Coach): ", re.MULTILINE)
 
 
 def read_commands(data: bytes, *, left: str | None, right: str | None, path: Path | None = None) -> CommandLog:
-    """Reads a command log.
+    """Read a command log.
 
     Args:
         data: the decompressed log.
-        left, right: the teams' names, as the game log has them. Lines of other senders are counted as a problem.
+        left, right: the teams' names in the game log. Lines of other senders are counted as a problem.
         path: its name, for messages.
 
     Raises:
@@ -68,10 +68,10 @@ def read_commands(data: bytes, *, left: str | None, right: str | None, path: Pat
     stamped = stamps[:, 0] >= 0
     if not stamped.any():
         raise LogError("no line begins with a time stamp like '57,0<tab>': not a command log", path=path, line=1)
-    # A log that ends inside a line was cut off: its last command is not what the player sent.
+    # A log that ends inside a line was cut off: its last command is not whole.
     cut = not data.endswith(b"\n") and n > 0 and made["line"][n - 1] == len(starts) and not made["valid"][n - 1]
     n -= cut
-    # Views of the arrays for the worst case: what lies behind n was never touched and takes no memory.
+    # Views of the arrays for the worst case: the rows behind n were never touched and take no memory.
     commands: Columns = {"frame": np.zeros(n, np.int32)} | {name: values[:n] for name, values in made.items()}
     has_stoppage = bool((stamps[stamped, 1] >= 0).any())
     np.maximum(commands["stoppage"], 0, out=commands["stoppage"])
@@ -87,7 +87,7 @@ def read_commands(data: bytes, *, left: str | None, right: str | None, path: Pat
 
 
 def sender_names(data: bytes) -> list[str]:
-    """Team names in the order in which their first messages came; the first to connect plays on the left."""
+    """Return the team names in order of their first messages; the first to connect plays on the left."""
     return list(dict.fromkeys(name.decode("utf-8", "replace") for name in _SENDER.findall(data)))
 
 

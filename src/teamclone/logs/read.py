@@ -59,7 +59,7 @@ class LogPair:
 
 
 def find_matches(paths: Iterable[Path]) -> list[LogPair]:
-    """The matches in files and folders (searched recursively), each once, ordered by path.
+    """Return the matches in files and folders (searched recursively), each once, ordered by path.
 
     Files are paired by name: ``x.rcg.gz`` goes with ``x.rcl`` in any packing. A file named on its own is taken
     whatever it is called.
@@ -93,7 +93,7 @@ def find_matches(paths: Iterable[Path]) -> list[LogPair]:
 
 
 def partner_of(path: Path) -> Path | None:
-    """The other log of the same match beside ``path``, by name; None where there is none."""
+    """Return the other log of the same match beside ``path``, by name; None where there is none."""
     match = _LOG_NAME.match(path.name)
     if match is None:
         return None
@@ -106,11 +106,11 @@ def partner_of(path: Path) -> Path | None:
 
 
 def read_match(source: str | os.PathLike[str] | BinaryIO, *, partner: str | os.PathLike[str] | None = None) -> Match:
-    """Reads a match.
+    """Read a match.
 
     Args:
-        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz or zst. What it is
-            is told by its content.
+        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz or zst. Its content
+            shows which it is.
         partner: the other log. None looks for a file of the same name beside ``source``.
 
     Raises:
@@ -136,7 +136,7 @@ def read_match(source: str | os.PathLike[str] | BinaryIO, *, partner: str | os.P
 
 
 def read_pair(pair: LogPair) -> Match:
-    """Reads the match of a pair of files; a bad command log costs the commands, a bad game log the match.
+    """Read the match of a pair of files; a bad command log costs the commands, a bad game log the match.
 
     Raises:
         LogError: nothing can be read.
@@ -205,7 +205,7 @@ def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Ma
         Problem(
             code="truncated",
             severity=Severity.WARNING,
-            text=f"{source.broken}; kept what could be read",
+            text=f"{source.broken}; the readable part is kept",
             path=source.path,
             byte=len(source.data),
         )
@@ -239,7 +239,7 @@ def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Ma
 
 
 def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
-    """Reads a game log of any version from its decompressed bytes; the version is told by its first bytes.
+    """Read a game log of any version from its decompressed bytes; its first bytes give the version.
 
     Raises:
         LogError: it is no game log, or holds no frame.
@@ -261,7 +261,7 @@ def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _game_of_commands(data: bytes) -> GameLog:
-    """The little a command log says of the match: the names, in the order of connection."""
+    """Return the game that a command log shows: the names, in the order of connection."""
     names: list[str | None] = [*sender_names(data)[:2], None, None]
     return GameLog(
         log_version="none",
@@ -302,7 +302,7 @@ def _senders(rcl: _Source) -> set[str]:
 
 
 def _foreign(game: GameLog, log: CommandLog) -> bool:
-    """Whether the server executed hardly any of the logged commands, so that the logs are of two matches."""
+    """Return whether the server executed hardly any of the logged commands, so that the logs are of two matches."""
     commands = log.commands
     index = first_body_commands(commands, game.frames["playmode"])
     frame, slot = commands["frame"][index], slot_of(commands["side"][index], commands["unum"][index])
@@ -317,7 +317,7 @@ def _foreign(game: GameLog, log: CommandLog) -> bool:
 
 
 def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:
-    """What is odd about the match itself: an unfinished log, absent teams, players who left."""
+    """Return oddities of the match itself: an unfinished log, absent teams, players that left."""
     if source is None:
         return []
     path = source.path

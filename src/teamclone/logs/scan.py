@@ -1,7 +1,7 @@
 """Scanning kernels: bytes of a text log to arrays of numbers, compiled by Numba.
 
-They allocate nothing and raise nothing: what they cannot read they mark, and the callers in `shows`, `rcg_text`
-and `rcl` say it in words.
+They allocate nothing and raise nothing: they mark what they cannot read, and the callers in `shows`, `rcg_text` and
+`rcl` make problems of the marks.
 
 Most of a log is short numbers and words of unforeseeable length, so a loop over bytes would cost a mispredicted branch
 each. Where it matters eight bytes are taken as one 64-bit word (first byte lowest) and the questions "which byte is no
@@ -27,7 +27,7 @@ Bytes = NDArray[np.uint8]
 _POWERS = 10.0 ** np.arange(23)
 
 PLAYER_FLOATS = tuple(column.name for column in PLAYERS if column.dtype == "float32")
-"""Where the float columns of a player stand in the array that scan_shows fills."""
+"""The float columns of a player in their order in the array that scan_shows fills."""
 _VIEW_WIDTH = PLAYER_FLOATS.index("view_width")
 _FOCUS = PLAYER_FLOATS.index("focus_distance")
 _STAMINA = PLAYER_FLOATS.index("stamina")
@@ -52,7 +52,7 @@ _int: Any = np.int64
 
 @_helper
 def _byte(buffer: Bytes, position: int) -> int:
-    """The byte at a position that is not negative: spares Numba's test for indices that count from the end."""
+    """Return the byte at a position that is not negative: spares Numba's test for indices that count from the end."""
     return buffer[np.uintp(position)]
 
 
@@ -71,7 +71,7 @@ _HIGH_BITS = np.uint64(0x8080808080808080)
 
 @_helper
 def _word(buffer: Bytes, position: int) -> np.uint64:
-    """Eight bytes as one number, the first lowest; zeros behind the end of the buffer."""
+    """Return eight bytes as one number, the first lowest; zeros behind the end of the buffer."""
     word = _ZERO
     if position + 8 <= len(buffer):
         for index in range(8):  # the compiler makes one load of it
@@ -84,7 +84,7 @@ def _word(buffer: Bytes, position: int) -> np.uint64:
 
 @_helper
 def _first(mask: np.uint64) -> int:
-    """Which byte a mask names first, 0 to 7; 8 for an empty mask."""
+    """Return which byte a mask names first, 0 to 7; 8 for an empty mask."""
     if mask == _ZERO:
         return 8
     lowest = (mask & (~mask + _ONE)) >> np.uint64(7)  # 1 << 8 * index
@@ -94,7 +94,7 @@ def _first(mask: np.uint64) -> int:
 
 @_helper
 def _below(n_bytes: int) -> np.uint64:
-    """All bits of the first ``n_bytes`` bytes of a word."""
+    """Return all bits of the first ``n_bytes`` bytes of a word."""
     if n_bytes >= 8:
         return ~_ZERO
     return (_ONE << np.uint64(8 * n_bytes)) - _ONE
@@ -102,13 +102,13 @@ def _below(n_bytes: int) -> np.uint64:
 
 @_helper
 def _not_zero(word: np.uint64) -> np.uint64:
-    """The mask of the bytes that are not zero."""
+    """Return the mask of the bytes that are not zero."""
     return (((word & _LOW_BITS) + _LOW_BITS) | word) & _HIGH_BITS
 
 
 @_helper
 def _find(buffer: Bytes, position: int, stop: int, byte: int) -> int:
-    """Where ``byte`` stands first from ``position`` on; ``stop`` where it does not."""
+    """Return where ``byte`` stands first from ``position`` on; ``stop`` where it does not."""
     pattern = np.uint64(byte) * _EVERY
     while position < stop:
         found = _first(~_not_zero(_word(buffer, position) ^ pattern) & _HIGH_BITS)
@@ -120,7 +120,7 @@ def _find(buffer: Bytes, position: int, stop: int, byte: int) -> int:
 
 @_helper
 def _eight_digits(digits: np.uint64) -> int:
-    """The number of eight decimal digits, one a byte, the first lowest: pairs, then fours, then all."""
+    """Return the number of eight decimal digits, one a byte, the first lowest: pairs, then fours, then all."""
     pairs = digits * np.uint64(10) + (digits >> _EIGHT)
     ends = np.uint64(0x000000FF000000FF)
     fours = (pairs & ends) * np.uint64(0x000F424000000064)
@@ -129,7 +129,7 @@ def _eight_digits(digits: np.uint64) -> int:
 
 @_helper
 def _number(buffer: Bytes, start: int, stop: int) -> tuple[float, int]:
-    """The number at ``start`` and the position behind it; -1 for the position where there is none.
+    """Return the number at ``start`` and the position behind it; -1 for the position where there is none.
 
     The value is the double nearest to the text wherever the text has fewer than 16 digits. ``buffer[stop]``, where
     it exists, is no digit. nan and inf, which C++ streams print for broken values, are read as NaN.
@@ -166,8 +166,10 @@ def _number(buffer: Bytes, start: int, stop: int) -> tuple[float, int]:
 
 @_helper
 def _whole_number(buffer: Bytes, start: int, stop: int) -> tuple[int, int]:
-    """The number at ``start`` without its decimals and the position behind it; -1 for the position where there is
-    none that an int32 holds."""
+    """Return the number at ``start`` without its decimals, and the position behind it.
+
+    The position is -1 where there is no number that an int32 holds.
+    """
     if start < stop and start + 8 < len(buffer):
         digits = _word(buffer, start) ^ (np.uint64(48) * _EVERY)
         length = _first((((digits & _LOW_BITS) + np.uint64(0x76) * _EVERY) | digits) & _HIGH_BITS)
@@ -186,7 +188,7 @@ _INF = np.uint64(int.from_bytes(b"inf", "little"))
 
 @_helper
 def _any_number(buffer: Bytes, start: int, stop: int) -> tuple[float, int]:
-    """As `_number`, byte by byte: every number that C++ streams print, of any length."""
+    """Read any number that C++ streams print, byte by byte, of any length; else see `_number`."""
     position = start
     negative = False
     if position < stop and (_byte(buffer, position) == 45 or _byte(buffer, position) == 43):
@@ -249,7 +251,7 @@ def _any_number(buffer: Bytes, start: int, stop: int) -> tuple[float, int]:
 
 @_helper
 def _hexadecimal(buffer: Bytes, start: int, stop: int) -> tuple[int, int]:
-    """``0x..`` or a plain decimal at ``start`` and the position behind it; -1 where there is none."""
+    """Return ``0x..`` or a plain decimal at ``start`` and the position behind it; -1 where there is none."""
     position = start
     value = 0
     if position + 1 < stop and _byte(buffer, position) == 48 and _byte(buffer, position + 1) == 120:
@@ -289,7 +291,7 @@ def _blank(buffer: Bytes, position: int, stop: int) -> int:
 
 @_helper
 def _expect(buffer: Bytes, position: int, stop: int, byte: int) -> int:
-    """The position behind blanks and ``byte``; -1 where something else stands."""
+    """Return the position behind blanks and ``byte``; -1 where something else stands."""
     if position < 0:
         return -1
     position = _blank(buffer, position, stop)
@@ -300,7 +302,7 @@ def _expect(buffer: Bytes, position: int, stop: int, byte: int) -> int:
 
 @_helper
 def _skip_group(buffer: Bytes, position: int, stop: int) -> int:
-    """The position behind the closing parenthesis of the group we are in; -1 where it does not close."""
+    """Return the position behind the closing parenthesis of the group we are in; -1 where it does not close."""
     depth = 1
     while position < stop:
         if _byte(buffer, position) == 40:
@@ -327,7 +329,7 @@ def _scan_player(
     attention_unums: Any,
     counters: Any,
 ) -> tuple[int, int]:
-    """Reads ``((l 1) 0 0x9 ...)`` behind its first parenthesis: (position behind it or of the error, slot or -code)."""
+    """Read ``((l 1) 0 0x9 ...)`` behind its first parenthesis: (position behind it or of the error, slot or -code)."""
     begin = position
     position = _expect(buffer, position, stop, 40)
     if position < 0 or position + 1 >= stop:
@@ -447,17 +449,17 @@ def scan_shows(
     outcomes: NDArray[np.uint8],
     places: NDArray[np.int64],
 ) -> int:
-    """Reads n lines ``(show ...)`` of log versions 4 to 6, or of monitors since version 3.
+    """Read n lines ``(show ...)`` of log versions 4 to 6, or of monitors since version 3.
 
     Args:
         buffer: the log.
         starts, stops: (n,) where each line begins and ends.
         cycles: (n,); ball: (4, n); floats: (15, n, 22) in the order of PLAYER_FLOATS; types, states, qualities,
             attention_sides, attention_unums: (n, 22); counters: (12, n, 22). Filled; rows of bad lines are undefined.
-        outcomes: (n,) OK or what is wrong; places: (n,) the byte where it is wrong.
+        outcomes: (n,) OK or the code of an error; places: (n,) the byte of the error.
 
     Returns:
-        How many lines are good.
+        Number of good lines.
     """
     good = 0
     for frame in range(len(starts)):
@@ -574,7 +576,7 @@ _KEY_FACTOR = np.uint64(0x7AF027BC08D6AF57)
 
 
 def _key_of(first: Any, length: Any) -> Any:
-    """A number under 256, another one for each command, from its first eight letters and its length."""
+    """Return a number under 256, another one for each command, from its first eight letters and its length."""
     return ((first ^ length) * _KEY_FACTOR) >> np.uint64(56)
 
 
@@ -631,7 +633,7 @@ _QUALITIES = (b"high", b"low")
 
 
 def _alphabet(words: tuple[bytes, ...]) -> NDArray[np.uint8]:
-    """Words as rows of bytes, padded with zeros."""
+    """Return words as rows of bytes, padded with zeros."""
     rows = np.zeros((len(words), max(map(len, words)) + 1), np.uint8)
     for row, word in zip(rows, words, strict=True):
         row[: len(word)] = np.frombuffer(word, np.uint8)
@@ -643,7 +645,7 @@ _FLAG_BYTES, _WIDTH_BYTES, _QUALITY_BYTES = _alphabet(_FLAGS), _alphabet(_WIDTHS
 
 @_helper
 def _word_of(buffer: Bytes, position: int, stop: int, words: NDArray[np.uint8]) -> int:
-    """The position behind the blanks and the one of ``words`` that stand here; -1 where none does."""
+    """Return the position behind the blanks and the one of ``words`` that stand here; -1 where none does."""
     position = _blank(buffer, position, stop)
     for row in range(len(words)):
         at = position
@@ -658,7 +660,7 @@ def _word_of(buffer: Bytes, position: int, stop: int, words: NDArray[np.uint8]) 
 
 @_helper
 def _close(buffer: Bytes, position: int, stop: int) -> int:
-    """The closing parenthesis of the command we are in, quotes respected; -1 where it does not close."""
+    """Return the closing parenthesis of the command we are in, quotes respected; -1 where it does not close."""
     depth = 1
     quoted = False
     while position < stop:
@@ -694,7 +696,10 @@ _LEG_NUMBERS = _int(2)
 def _plain_numbers(
     buffer: Bytes, position: int, stop: int, row: int, first: int, most: int, args: Any
 ) -> tuple[int, int]:
-    """Reads up to ``most`` finite numbers into args[first:, row]: (how many or -1 for a bad one, position behind)."""
+    """Read up to ``most`` finite numbers into args[first:, row].
+
+    Returns how many, -1 for a bad one, and the position behind.
+    """
     count = 0
     while True:
         position = _blank(buffer, position, stop)
@@ -718,7 +723,7 @@ def _plain_numbers(
 
 @_helper
 def _legs(buffer: Bytes, position: int, stop: int, row: int, args: Any) -> int:
-    """Reads ``(l P D)(r P D)`` of a two-leg dash: bit 1 left, bit 2 right; -1 where it is wrong."""
+    """Read ``(l P D)(r P D)`` of a two-leg dash: bit 1 left, bit 2 right; -1 where it is wrong."""
     legs = _int(0)
     while True:
         position = _blank(buffer, position, stop)
@@ -761,7 +766,7 @@ def _scan_command(
     args: Any,
     texts: Any,
 ) -> int:
-    """Reads the command that begins at ``position``; the position behind it, ``stop`` where the rest is garbage."""
+    """Read the command at ``position``; the position behind it, ``stop`` where the rest is garbage."""
     texts[0, row] = texts[1, row] = position
     kinds[row] = _ILLEGAL
     valid[row] = False
@@ -838,7 +843,7 @@ _RECEIVED = np.uint64(int.from_bytes(b"Recv ", "little"))
 
 @_helper
 def _count(buffer: Bytes, start: int, stop: int) -> tuple[int, int]:
-    """A plain number under 2^31 and the position behind it; -1 for the position where there is none."""
+    """Return a plain number under 2^31 and the position behind it; -1 for the position where there is none."""
     position = start
     value = 0
     while position < stop and _is_digit(_byte(buffer, position)) and position - start < 10:
@@ -851,7 +856,7 @@ def _count(buffer: Bytes, start: int, stop: int) -> tuple[int, int]:
 
 @_helper
 def _stamp(buffer: Bytes, position: int, stop: int) -> tuple[int, int, int]:
-    """Reads ``TIME,STOP<tab>`` or ``TIME<tab>``: time, stoppage (-1 if absent), position behind (-1 if neither)."""
+    """Read ``TIME,STOP<tab>`` or ``TIME<tab>``: time, stoppage (-1 if absent), position behind (-1 if neither)."""
     stoppage = -1
     cycle, position = _count(buffer, position, stop)
     if 0 <= position < stop and _byte(buffer, position) == 44:
@@ -890,7 +895,7 @@ def scan_commands(
     line_stamps: NDArray[np.int32],
     last: NDArray[np.int64],
 ) -> int:
-    """Reads the lines of a command log.
+    """Read the lines of a command log.
 
     Args:
         buffer: the log; starts, stops: (n_lines,) its lines.
@@ -903,7 +908,7 @@ def scan_commands(
         last: (3, 12, 3) room for the last time, stoppage and order of each side and number.
 
     Returns:
-        How many commands were read.
+        Number of commands read.
     """
     row = _int(0)  # as a literal 0 it would have each helper compiled twice
     for index in range(12):

@@ -15,14 +15,14 @@ from teamclone.rcss.players import N_PLAYERS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shows:
-    """n records. What stands in the rows of a bad one is undefined.
+    """n records; the rows of a bad one are undefined.
 
     Attributes:
         cycle: (n,) int32.
         ball: (n, 4) float32: x, y in metres, vx, vy in metres per cycle.
         players: the columns `columns.PLAYERS`, (n, 22) each.
-        outcomes: (n,) `scan.OK` or what is wrong.
-        places: (n,) the byte where it is wrong.
+        outcomes: (n,) `scan.OK` or the code of an error.
+        places: (n,) the byte of the error.
     """
 
     cycle: NDArray[np.int32]

@@ -1,4 +1,4 @@
-"""What a model answers to a batch of situations, in one form for every head."""
+"""A model's answer to a batch of situations, in one form for every head."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Answer(ABC):
 
     @property
     def logits(self) -> Tensor:
-        """(batch, commands) calibrated by the temperature."""
+        """(batch, commands) logits, calibrated by the temperature."""
         return self.raw_logits / self.temperature
 
     @property
     def probabilities(self) -> Tensor:
-        """(batch, commands) calibrated by the temperature."""
+        """(batch, commands) probabilities, calibrated by the temperature."""
         return self.logits.softmax(1)
 
     @abstractmethod

@@ -1,7 +1,7 @@
 """Distributions of command parameters: mixtures of logistic components, cut off where the server cuts off.
 
-A logistic component is a bell with heavier tails than the normal one, whose distribution function is a plain sigmoid:
-what the server clips, all powers above 100 and turn moments beyond 180, is a part of the distribution in closed form.
+A logistic component has heavier tails than a normal one, and its distribution function is a plain sigmoid. So the
+probability of clipped values, all powers above 100 and turn moments beyond 180, has a closed form.
 All densities are per unit of power or per degree of the command's argument.
 """
 
@@ -21,7 +21,7 @@ LEAST_POWER = 0.03
 LEAST_PLACE = 0.03
 """Smallest scales: agents write arguments to the thousandth, and no density may run away."""
 CLIPPED = 1e-2
-"""An argument so close to its bound, in its unit, was clipped to it."""
+"""An argument this close to its bound, in its unit, counts as clipped."""
 
 
 MEDOID_COMPONENTS = 128
@@ -37,34 +37,37 @@ class Mixture(NamedTuple):
 
 
 def scale_of(raw: Tensor, *, least: float, typical: float) -> Tensor:
-    """A scale from an unbounded output: about ``typical`` for 0, at most some twenty times as much."""
-    # Bent, not cut off: what is cut off has no gradient to come back by.
+    """Return a scale from an unbounded output: about ``typical`` for 0, at most some twenty times as much."""
+    # Bent, not cut off: beyond a cut there is no gradient.
     return least + typical * torch.exp(3.0 - functional.softplus(3.0 - raw))
 
 
 def wrap(angle: Tensor) -> Tensor:
-    """The same angle in [-pi, pi)."""
+    """Return angles in radians, any shape, in [-pi, pi)."""
     return torch.remainder(angle + math.pi, 2 * math.pi) - math.pi
 
 
 def _log_bell(away: Tensor, scale: Tensor) -> Tensor:
-    """Logarithm of the logistic density at a distance from its centre."""
+    """Return the logarithm of the logistic density at a distance from its centre."""
     z = away / scale
     return -z - 2 * functional.softplus(-z) - torch.log(scale)
 
 
 def _mass(low: Tensor, high: Tensor, scale: Tensor) -> Tensor:
-    """Of a logistic bell around 0, the part between; taken on the side of its tail, where a difference is exact."""
+    """Return the probability of ``low``..``high`` under a logistic density centred at 0.
+
+    It is evaluated in the tail, where the difference of two sigmoids loses no digits.
+    """
     flip = low + high > 0
     low, high = torch.where(flip, -high, low), torch.where(flip, -low, high)
     return torch.sigmoid(high / scale) - torch.sigmoid(low / scale)
 
 
 def clipped_terms(parts: Mixture, value: Tensor, *, low: float, high: float) -> Tensor:
-    """(batch, components) log-likelihoods of a value in ``low``..``high`` that each component alone gives it.
+    """Return (batch, components) the log-likelihood of a value in ``low``..``high`` under each component.
 
     Args:
-        value: (batch,). At a bound it stands for all that a component has beyond.
+        value: (batch,). At a bound its likelihood is the probability of all values beyond.
     """
     away = value[:, None] - parts.centre
     inside = _log_bell(away, parts.scale)
@@ -75,12 +78,12 @@ def clipped_terms(parts: Mixture, value: Tensor, *, low: float, high: float) -> 
 
 
 def power_terms(parts: Mixture, power: Tensor) -> Tensor:
-    """`clipped_terms` of a power in 0..100."""
+    """Return `clipped_terms` of a power in 0..100."""
     return clipped_terms(parts, power, low=0.0, high=100.0)
 
 
 def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None) -> Tensor:
-    """(batch, components) log-likelihoods of an angle that each component, wrapped around the circle, gives it.
+    """Return (batch, components) the log-likelihood of an angle under each component, wrapped around the circle.
 
     Args:
         parts: centres and scales in radians.
@@ -91,7 +94,7 @@ def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None
     whole = torch.tanh(math.pi / (2 * parts.scale))  # of the bell within half a turn to each side
     away = wrap((degrees / factor * DEGREE)[:, None] - parts.centre)
     inside = _log_bell(away, parts.scale) - torch.log(whole) + math.log(DEGREE) - torch.log(factor)[:, None]
-    # What lies beyond the bound: an arc from it to straight behind, on the side of the argument.
+    # Angles beyond the bound: an arc from it to straight behind, on the side of the argument.
     bound = (math.pi / factor).clamp(max=0.99 * math.pi)
     length = (math.pi - bound)[:, None]
     start = torch.where(degrees > 0, bound, -math.pi)[:, None]
@@ -105,37 +108,37 @@ def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None
 
 
 def log_likelihood(logits: Tensor, terms: Tensor) -> Tensor:
-    """(batch,) of the mixture, from what each component gives."""
+    """Return (batch,) the log-likelihood of the mixture, from those of its components."""
     return torch.logsumexp(torch.log_softmax(logits, 1) + terms, 1)
 
 
 def halves(parts: Mixture) -> tuple[Mixture, Mixture]:
-    """Those of the first and of the second half of the batch."""
+    """Return the mixtures of the first and of the second half of the batch."""
     # Not by chunk, which torch.export knows for one length of the batch only.
     n = parts.centre.shape[0] // 2
     return Mixture(*(part[:n] for part in parts)), Mixture(*(part[n:] for part in parts))
 
 
 def mirrored(angles: Mixture) -> Mixture:
-    """The same with left and right exchanged."""
+    """Return the mixture with left and right exchanged."""
     return angles._replace(centre=-angles.centre)
 
 
 def concatenate(parts: Sequence[Mixture]) -> Mixture:
-    """One mixture of the components of several, whose shares are known beside one another."""
+    """Concatenate the components of mixtures; their logits are on one scale and are not renormalised."""
     return Mixture(*(torch.cat(columns, 1) for columns in zip(*parts, strict=True)))
 
 
 def merged(parts: Sequence[Mixture]) -> Mixture:
-    """One mixture of the components of several, each with its share divided by their number."""
+    """Return the mean of several mixtures: their components, each share divided by their number."""
     shares = [part._replace(logits=torch.log_softmax(part.logits, 1)) for part in parts]
     return concatenate(shares)
 
 
 def weighted_medoid(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
-    """(batch,) the centre with the least expected distance to all: the median among the components.
+    """Return (batch,) the centre with the least expected distance to all: the median among the components.
 
-    A mean would lie between left and right, where nobody kicks.
+    A mean would lie between left and right, where no player kicks.
     """
     if centre.shape[1] > MEDOID_COMPONENTS:
         chosen = logits.topk(MEDOID_COMPONENTS, dim=1).indices
@@ -147,36 +150,39 @@ def weighted_medoid(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
 
 
 def weighted_medoid_place(logits: Tensor, x: Tensor, y: Tensor) -> Tensor:
-    """(batch, 2) the same among places."""
+    """Return (batch, 2) the place with the least expected distance to all, see `weighted_medoid`."""
     apart = torch.hypot(x[:, :, None] - x[:, None, :], y[:, :, None] - y[:, None, :])
     place = _nearest_to_all(logits, apart)
     return torch.cat([x.gather(1, place), y.gather(1, place)], 1)
 
 
 def _nearest_to_all(logits: Tensor, apart: Tensor) -> Tensor:
-    """(batch, 1) the component with the least expected distance; ``apart`` is (batch, components, components)."""
+    """Return (batch, 1) the component with the least expected distance.
+
+    ``apart`` is (batch, components, components).
+    """
     return (apart * logits.softmax(1)[:, :, None]).sum(1).argmin(1, keepdim=True)
 
 
 def mean_logits(logits: Sequence[Tensor]) -> Tensor:
-    """(batch, classes) logarithms of the mean probabilities."""
+    """Return (batch, classes) logarithms of the mean probabilities."""
     return torch.stack([torch.log_softmax(of, 1) for of in logits]).logsumexp(0) - math.log(len(logits))
 
 
 def class_of(degrees: Tensor, count: int) -> Tensor:
-    """(batch,) which of ``count`` directions, the first of them straight ahead, is the nearest."""
+    """Return (batch,) the nearest of ``count`` directions, the first of them straight ahead."""
     return torch.round(degrees * (count / 360.0)).long() % count
 
 
 def log_class(logits: Tensor, degrees: Tensor) -> Tensor:
-    """(batch,) log-likelihood of a direction, taken as even within its class."""
+    """Return (batch,) the log-likelihood of a direction, uniform within its class."""
     count = logits.shape[1]
     chosen = torch.log_softmax(logits, 1).gather(1, class_of(degrees, count)[:, None]).squeeze(1)
     return chosen - math.log(360.0 / count)
 
 
 def direction_of(logits: Tensor) -> Tensor:
-    """(batch,) degrees of the most probable direction."""
+    """Return (batch,) degrees of the most probable direction."""
     count = logits.shape[1]
     degrees = logits.argmax(1).to(logits.dtype) * (360.0 / count)
     return torch.where(degrees > 180.0, degrees - 360.0, degrees)

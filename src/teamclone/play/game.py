@@ -28,11 +28,11 @@ LEAST_ROOM = 32 << 20
 
 _POLL_S = 0.05
 _LOOK_S = 2.0
-"""Between two looks at a match that goes on."""
+"""Between two looks at a running match."""
 _GONE_S = 0.3
-"""From the first player that is gone to the verdict: others may be about to follow."""
+"""From the first player that is gone to the verdict, in case others follow."""
 _LEAVE_S = 1.0
-"""How long teams have to go by themselves when the server is gone."""
+"""How long teams may take to end by themselves after the server."""
 _SERVER_LOG = "server.txt"
 
 
@@ -72,10 +72,10 @@ class Game:
         self.stop = True
 
     def look(self, monitor: MonitorClient | None = None, *, seconds: float = _POLL_S) -> None:
-        """Wait a moment, then take in what the monitor shows.
+        """Wait a moment, then take in the monitor's newest cycle.
 
         Args:
-            monitor: None where there is nothing to see yet.
+            monitor: None before the server shows anything.
             seconds: how long to wait.
 
         Raises:
@@ -109,7 +109,7 @@ class Game:
             self.gone_at = None
 
     def how_ended(self, side: int) -> str:
-        """Say which processes of a team ended by themselves, and how."""
+        """Describe which processes of a team ended by themselves, and how."""
         labels: dict[int, list[str]] = {}
         for label, client in self.clients[side].items():
             code = client.poll()
@@ -119,7 +119,7 @@ class Game:
         return f" ({'; '.join(ended)})" if ended else ""
 
     def is_over(self, *, kicked_off: bool = True) -> bool:
-        """Return whether the server has ended as it should; whether it played to the end its logs must show.
+        """Return whether the server has ended, or is silent after the end of the match.
 
         Args:
             kicked_off: False while teams are still to come, when the server should not end at all.
@@ -144,7 +144,7 @@ class Game:
         return True
 
     def server_output(self) -> str:
-        """Return what the server has printed so far."""
+        """Return the server's output so far."""
         with suppress(OSError):
             return (self.output / _SERVER_LOG).read_text("utf-8", "replace")
         return ""
@@ -153,8 +153,8 @@ class Game:
         """Play from the start of the server to its end. Afterwards call `finish`, whatever happened.
 
         Raises:
-            FailedError: it did not come to its end.
-            StoppedError: it is no longer wanted.
+            FailedError: the match failed.
+            StoppedError: the match is no longer wanted.
         """
         free = shutil.disk_usage(self.folder).free
         if free < LEAST_ROOM:
@@ -168,7 +168,7 @@ class Game:
             self.wait_for_server(monitor)
             self.bring_in_teams(monitor)
             while not self.is_over():
-                # When a player is gone we stay, to see which others are.
+                # When a player is gone, wait to see which others are.
                 watching = self.kick_off_at is None or self.gone_at is not None
                 monitor.rest_s = 0.0 if watching else min(_LOOK_S, self.fixture.limits.stall_s / 4)
                 self.look(monitor)
@@ -217,7 +217,7 @@ class Game:
             self.is_over(kicked_off=False)
 
     def bring_in_teams(self, monitor: MonitorClient) -> None:
-        """Start one client after the other, so that each gets the number we know it by; the left goalkeeper first."""
+        """Start one client after the other, so that each gets a known number; the left goalkeeper first."""
         began = [0.0, 0.0]
         waiting = [team.clients() for team in self.teams]
         number = 0
@@ -302,7 +302,7 @@ class Game:
 
 
 def _ending(code: int | None) -> str:
-    """Say an exit code in words."""
+    """Return an exit code in words."""
     if code is None:
         return "still runs"
     if code < 0:

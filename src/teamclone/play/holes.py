@@ -65,6 +65,6 @@ def count_holes(match: Match) -> Holes:
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> int:
-    """Return how many True there are in a row at most."""
+    """Return the greatest number of True in a row."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))

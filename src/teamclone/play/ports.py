@@ -1,4 +1,4 @@
-"""Ports for one server: three in a row that nobody uses, held against the other matches of this machine."""
+"""Ports for one server: three free ones in a row, held against the other matches of this machine."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pathlib import Path
 from teamclone.system.files import held
 
 DEFAULT_PORT = 6000
-"""Of the players; the trainer's is the next, the online coaches' the one after."""
+"""The server's default port for players; the trainer's is the next, the online coaches' the one after."""
 STEP = 10
 LAST_PORT = 32_000
-"""Above lie the ports that the system gives to clients, also to ours."""
+"""Ports above it are those that the system gives to clients, also to ours."""
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Processes of a match: started so that none outlives it, whatever they do and however its supervisor ends.
 
-On Linux the supervisor adopts what its children leave behind, also what made itself a daemon, and its children die with
-it. Elsewhere an orphan is out of reach once its parent is gone.
+On Linux the supervisor adopts the orphans of its children, daemons included, and its children die with it. Elsewhere an
+orphan is out of reach once its parent is gone.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 
 
 def adopt_orphans() -> None:
-    """Become the parent of all that the processes started from here leave behind."""
+    """Become the parent of all orphans of processes started from here."""
     if _LIBC is not None:
         _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
@@ -62,7 +62,7 @@ def _die_with_parent() -> None:
 
 
 def end_all(*, grace_s: float = GRACE_S) -> None:
-    """End all that was started from this process, and all that it adopted; what does not go in time is killed."""
+    """End all processes that were started from this one or adopted; kill those that do not end in time."""
     deadline = time.monotonic() + grace_s
     give_up = deadline + GIVE_UP_S
     left = _descendants()

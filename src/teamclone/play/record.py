@@ -1,4 +1,4 @@
-"""``match.json``: what became of a match, and all that is needed to say how it was played."""
+"""``match.json``: the outcome of a match, and all that is needed to know how it was played."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ NAME = "match.json"
 
 
 class Fault(StrEnum):
-    """Why a match did not come to its end."""
+    """The reason for which a match failed."""
 
     NO_PORT = "no port"
-    """The ports it needs are in use."""
+    """The ports that the server needs are in use."""
     SERVER_START = "server did not start"
     SERVER_DIED = "server died"
     STALLED = "server stalled"
@@ -44,7 +44,7 @@ class FailedError(Exception):
     """A match has failed.
 
     Attributes:
-        fault, text, side, unums: as in `Trouble`, but for the side: 0 left, 1 right.
+        fault, text, side, unums: see `Trouble`; but here the side is 0 left, 1 right.
     """
 
     def __init__(self, fault: Fault, text: str, *, side: int | None = None, unums: Iterable[int] = ()) -> None:
@@ -53,7 +53,7 @@ class FailedError(Exception):
 
 
 def who(team: TeamSpec, unums: Iterable[int]) -> str:
-    """Name players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
+    """Return players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
     numbers = sorted(unums)
     if len(numbers) == N_TEAM:
         return f"{team.name}: the whole team is"
@@ -63,7 +63,7 @@ def who(team: TeamSpec, unums: Iterable[int]) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble:
-    """A fault: what happened, in words, and whose it was.
+    """A fault: its text, and the team and players at fault.
 
     Attributes:
         side: "left" or "right" where a team is at fault, else None.
@@ -79,7 +79,7 @@ class Trouble:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
-        """Make it of what `to_json` returned."""
+        """Make a trouble from its fields by name, as JSON has them."""
         return cls(**{**values, "fault": Fault(values["fault"]), "unums": tuple(values["unums"])})
 
 
@@ -89,7 +89,7 @@ class Side:
 
     Attributes:
         team: its name in the schedule.
-        name: its name in the logs; None where it never came.
+        name: its name in the logs; None where it never connected.
         score: goals.
         holes, clashes, missed: of players 1 to 11, see `holes`; None where there are no whole logs.
         files: SHA-256 of its programs, by path.
@@ -107,7 +107,7 @@ class Side:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
-        """Make it of what `to_json` returned."""
+        """Make a side from its fields by name, as JSON has them."""
         lists = {
             name: value and tuple(value) for name, value in values.items() if name in ("holes", "clashes", "missed")
         }
@@ -116,7 +116,7 @@ class Side:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """What one attempt at a match came to. It is a match, and data, if ``trouble`` is None.
+    """The outcome of one attempt at a match. It is a match, and data, if ``trouble`` is None.
 
     Attributes:
         id, fingerprint: of the fixture.
@@ -151,16 +151,16 @@ class Record:
 
     @property
     def complete(self) -> bool:
-        """Whether the match was played to its end."""
+        """True if the match was played to its end."""
         return self.trouble is None
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as a JSON document holds it."""
+        """Return the fields by name, for a JSON document; `from_json` is the inverse."""
         return {"format": FORMAT, "outcome": "complete" if self.complete else "failed", **dataclasses.asdict(self)}
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
-        """Make it of what `to_json` returned."""
+        """Make a record from its fields by name, as JSON has them."""
         kept = {name: value for name, value in values.items() if name not in ("format", "outcome")}
         kept["trouble"] = kept["trouble"] and Trouble.from_json(kept["trouble"])
         kept |= {side: Side.from_json(kept[side]) for side in ("left", "right")}

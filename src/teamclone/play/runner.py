@@ -1,7 +1,7 @@
 """The matches of a schedule, many at once: gone on with where it stopped, tried again where one failed.
 
-In the folder of a schedule, ``matches/ID`` is a whole match and appears at once, ``failed/ID/N`` is what is left of
-attempt N, whose logs no reader takes for logs. What is being played lies in ``.playing``.
+In the folder of a schedule, ``matches/ID`` is a whole match and appears at once, ``failed/ID/N`` holds the remains of
+attempt N, with logs renamed so that no reader takes them for logs. Matches that are being played lie in ``.playing``.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ _END_S = 30.0
 """How long a supervisor has to end its match."""
 
 OnRecord = Callable[[Record], None]
-"""Called with what became of a match, as soon as that is known."""
+"""Called with the record of a match, as soon as it is known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayReport:
-    """What became of each match of a schedule.
+    """The outcome of each match of a schedule.
 
     Attributes:
         records: of all matches, in the order of the schedule: the match, or the last attempt at it.
@@ -67,7 +67,7 @@ class PlayReport:
         return tuple(record for record in self.records if not record.complete)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as a JSON document holds it."""
+        """Return the report as ``teamclone play --json`` prints it."""
         return {
             "matches": len(self.records),
             "complete": len(self.records) - len(self.failed),
@@ -99,23 +99,25 @@ def play(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_record: OnRecord = lambda record: None,
 ) -> PlayReport:
-    """Play what is missing of a schedule.
+    """Play the missing matches of a schedule.
 
     A match that failed is tried up to ``schedule.attempts`` times, then it counts as failed, also for the next call.
     When this ends, however it ends, servers and clients end with it.
 
     Args:
-        out: where the matches go; with those of an earlier call that was stopped or killed.
+        schedule: the matches, see `load_schedule`.
+        out: the folder for the matches; it may hold those of an earlier call that was stopped or killed.
         store: each match is added to it as it ends, and those that were there before.
         executor: where matches are played, for example on a cluster (``cluster.executor_of``); its workers must see
             ``out`` and the teams under the same paths. None plays on this machine.
         jobs: how many at once, None for one a processor; in real time, where it must not be busy, one for two.
         retry_failed: forget the attempts at matches that failed before.
-        on_progress: called with how many matches are accounted for, and how many there are.
+        on_progress: called with the number of matches that are complete or failed, and of all.
+        on_record: called with the record of each match, as soon as it is known.
 
     Raises:
         UsageError: ``out`` holds matches of another schedule, or a worker does not see it.
-        PlayError: there is no server, another process plays into ``out``, or the disk is full; what was played stays.
+        PlayError: there is no server, another process plays into ``out``, or the disk is full; matches played stay.
         StoreError: the store cannot be written.
         ClusterError: the connection to the executor's workers was lost.
     """
@@ -155,7 +157,7 @@ def play(
             on_record(record)
             if record.trouble and record.trouble.fault is Fault.DISK_FULL:
                 raise PlayError(
-                    f"{out}: {record.trouble.text}; make room and give the same command again, what was played stays"
+                    f"{out}: {record.trouble.text}; make room and give the command again, matches played stay"
                 )
             with suppress(StoreError):  # busy, perhaps: tried again with the next match, and at the end
                 stored.add([record] if record.complete else [])
@@ -169,7 +171,7 @@ def play(
 
 
 def _clear(playing: Path) -> None:
-    """Remove what is half played, with the processes that still play it."""
+    """Remove matches that are half played, and end the processes that still play them."""
     kill_marked(playing)
     shutil.rmtree(playing, ignore_errors=True)
 
@@ -186,7 +188,7 @@ def _wanted(out: Path) -> Path:
 
 
 def _known_records(schedule: Schedule, out: Path) -> dict[str, Record]:
-    """Records of the matches that are not to be played, by id."""
+    """Return the records of the matches that are not to be played, by id."""
     known = {fixture.id: _known(fixture, schedule.attempts, out) for fixture in schedule.fixtures}
     return {name: record for name, record in known.items() if record is not None}
 
@@ -306,9 +308,8 @@ def _attempt(order: Order, wanted: Path) -> Record:
             return Record.from_json(json.loads(answer.read()))
     kill_marked(order.folder)
     words = (order.folder / "supervisor.txt").read_text("utf-8", "replace").strip().splitlines()
-    text = (
-        f"the process that looked after the match ended with code {code}: {words[-1] if words else 'it said nothing'}"
-    )
+    last = words[-1] if words else "it printed nothing"
+    text = f"the process that looked after the match ended with code {code}: {last}"
     record = _unsupervised(order.fixture, order.attempt, text)
     bury_logs(order.folder)
     save_record(order.folder, record)

@@ -1,4 +1,4 @@
-"""What is to be played: teams, pairings, the server's options; from TOML, with every mistake reported at once."""
+"""The matches to play: teams, pairings, the server's options; from TOML, with every mistake reported at once."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from teamclone.system.files import digest
 from teamclone.system.settings import entries, from_table, setting
 
 COACH = 12
-"""The number by which the league's ``start`` scripts know the coach."""
+"""The coach's number in the league's ``start`` scripts."""
 
 PLACEHOLDERS = ("host", "port", "coach_port", "olcoach_port", "unum", "team", "folder")
-"""What a team's commands may hold in braces."""
+"""Words in braces that a team's commands may hold."""
 
 OPTIONS: Mapping[str, bool | int | float | str] = {
     "server::synch_mode": True,
@@ -36,14 +36,14 @@ OPTIONS: Mapping[str, bool | int | float | str] = {
     "server::game_log_compression": 6,
     "server::text_log_compression": 6,
 }
-"""The server's options unless the schedule says otherwise: those of the paper, and small logs."""
+"""The server's options where the schedule sets none: those of the paper, and small logs."""
 
 OURS = (
     *("port", "coach_port", "olcoach_port", "auto_mode", "connect_wait", "coach", "team_l_start", "team_r_start"),
     *(f"{log}_log_{option}" for log in ("game", "text") for option in ("dir", "fixed", "dated")),
     *("game_logging", "text_logging"),
 )
-"""Options of the server that a schedule may not set: by them a match is run."""
+"""Options of the server that a schedule may not set, because the match itself needs them."""
 
 OTHER_SECTIONS = ("store", "dataset", "train", "evaluate")
 """Sections of a schedule that are for `teamclone pipeline`, see `pipeline`."""
@@ -53,7 +53,7 @@ MAX_FIXTURES = 100_000
 _PLACEHOLDER = re.compile(r"(?<!\$)\{(\w*)\}")  # ${NAME} is for a shell
 _VARIABLE = re.compile(r"[A-Za-z_]\w*")
 _WORD = re.compile(r"[\w./+-]*")
-"""What the server's parser takes as the value of an option."""
+"""A value of an option that the server's parser accepts."""
 _NUMBERS = ("half_time", "nr_normal_halfs", "extra_half_time", "nr_extra_halfs", "simulator_step")
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
@@ -65,10 +65,10 @@ class TeamSpec:
     No shell reads these commands; ``sh -c '...'`` is one. Each may hold the PLACEHOLDERS.
 
     Attributes:
-        name: what the schedule calls it; the name that its players give the server may be another.
+        name: its name in the schedule; the name that its players give the server may be another.
         folder: where its commands run; the folder of the schedule unless given.
         command: starts the whole team.
-        start: a script as the league has them, called with host, folder and number once for each client: 1 is the
+        start: a script by the league's rules, called with host, folder and number once for each client: 1 is the
             goalkeeper, 12 the coach.
         player, goalie, coach: start one client. Without ``coach`` the team has none.
         environment: variables to add.
@@ -100,7 +100,7 @@ class TeamSpec:
 
     @property
     def takes_port(self) -> bool:
-        """Whether it can play at another port than the default."""
+        """True if it can play at another port than the default."""
         words = [*self.environment.values(), *(word for _, words in self.clients() for word in words)]
         return any("{port}" in word for word in words)
 
@@ -119,7 +119,7 @@ class ServerSpec:
 
     @property
     def synch(self) -> bool:
-        """Whether the server waits for its clients in every cycle."""
+        """True if the server waits for its clients in every cycle."""
         return self.options.get("server::synch_mode") is True
 
     @property
@@ -136,10 +136,11 @@ class Limits:
     """How long things may take, in seconds of wall time.
 
     Attributes:
-        connect_s: from the start of a team to all its players being there.
-        stall_s: without a sign of life of the server.
+        connect_s: from the start of a team until all its players are connected.
+        stall_s: without a message of the server.
         match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10, and a few minutes.
-        silent_cycles: in a row without anything from a player on the field, who then counts as hung; 0 is never.
+        silent_cycles: in a row without a command from a player on the field; the player then counts as hung. 0 is
+            never.
     """
 
     connect_s: float = setting(60.0, above=0)
@@ -166,7 +167,7 @@ class Fixture:
 
     @property
     def takes_port(self) -> bool:
-        """Whether both teams can play at another port than the default."""
+        """True if both teams can play at another port than the default."""
         return self.left.takes_port and self.right.takes_port
 
     @property
@@ -178,17 +179,17 @@ class Fixture:
 
     @property
     def fingerprint(self) -> str:
-        """A hash that is the same for fixtures that ask for the same match; limits do not count."""
+        """A hash that is equal for fixtures that ask for equal matches; limits do not count."""
         asked = [dataclasses.asdict(part) for part in (self.left, self.right, self.server)]
         return digest(json.dumps([asked, self.seed], sort_keys=True).encode())
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as a JSON document holds it."""
+        """Return the fields by name, for a JSON document; `from_json` is the inverse."""
         return dataclasses.asdict(self)
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Fixture:
-        """Make it of what `to_json` returned."""
+        """Make a fixture from the fields that `to_json` returned."""
         parts = {"left": TeamSpec, "right": TeamSpec, "server": ServerSpec, "limits": Limits}
         return cls(**{name: parts[name](**value) if name in parts else value for name, value in values.items()})
 
@@ -297,7 +298,7 @@ def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedu
         problems += [f"teams.{name}: {problem}" for problem in _wrong(teams[name])]
     pairings = table.get("pairings", [])
     if not isinstance(pairings, list) or not pairings:
-        problems.append("no [[pairings]]: say who plays whom")
+        problems.append("no [[pairings]]: name the teams that play each other")
         pairings = []
     fixtures: list[Fixture] = []
     counts: dict[tuple[str, str], int] = {}
@@ -351,7 +352,7 @@ def filled_in(words: list[str], values: Mapping[str, Any]) -> list[str]:
 
 
 def _wrong(team: TeamSpec) -> list[str]:
-    """Find what is wrong with a team's commands."""
+    """Return the mistakes in a team's commands."""
     problems = []
     if not _NAME.fullmatch(team.name):
         problems.append("a name is made of at most 40 letters, digits, '_', '.', '+' and '-'")

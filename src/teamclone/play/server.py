@@ -1,4 +1,4 @@
-"""rcssserver: where it is, which version, how it is started."""
+"""rcssserver: its path, its version, its command line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CONNECT_CYCLES_PER_S = 20
 """In synch mode a cycle before the kick-off takes at least 50 ms."""
 
 MAX_PROGRAMS = 64
-"""Of a team, whose hashes are kept."""
+"""Programs of a team of which hashes are kept, at most."""
 
 _VERSION = re.compile(r"rcssserver-([\w.]+)")
 _SEED = re.compile(r"Simulator Random Seed: (-?\d+)")
@@ -85,10 +85,10 @@ def met_taken_port(output: str) -> bool:
 
 
 def last_words(output: str) -> str:
-    """Return the last line that speaks of an error, else the last that says something."""
+    """Return the last line that mentions an error, else the last line that is not empty."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     errors = [line for line in lines if re.search(r"\berror\b", line, re.IGNORECASE)]
-    return (errors or lines or ["it said nothing"])[-1][:200]
+    return (errors or lines or ["it printed nothing"])[-1][:200]
 
 
 def hashes(paths: Iterable[Path]) -> dict[str, str]:
@@ -101,7 +101,7 @@ def hashes(paths: Iterable[Path]) -> dict[str, str]:
 
 
 def programs_of(folder: Path, commands: Iterable[list[str]]) -> list[Path]:
-    """Find the files that say which version of a team played: those it names, and its folder's programs."""
+    """Find the files that identify a team's version: the programs of its commands and of its folder."""
     found = []
     for program, *others in commands:
         named = folder / program if "/" in program else Path(shutil.which(program) or program)

@@ -1,4 +1,4 @@
-"""The process that looks after one match: has it played, reads its logs, says what came of it.
+"""The process that looks after one match: has it played, reads its logs, reports the outcome.
 
 Run as ``python -m teamclone.play.supervisor``, with an `Order` as JSON in a line on standard input, which then stays
 open: its end is the request to stop, so that a supervisor ends with the process that asked for the match. The `Record`
@@ -34,7 +34,7 @@ STOPPED = 3
 """Exit code of a supervisor that was asked to stop."""
 
 FULL = 1 << 20
-"""If fewer bytes than this can be written, what went wrong is the disk's fault."""
+"""If fewer bytes than this can be written, a failure is attributed to the full disk."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class Order:
     attempt: int
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as a JSON document holds it."""
+        """Return the fields by name, for a JSON document; `from_json` is the inverse."""
         return {
             "fixture": self.fixture.to_json(),
             "folder": str(self.folder),
@@ -57,7 +57,7 @@ class Order:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
-        """Make it of what `to_json` returned."""
+        """Make an order from the fields that `to_json` returned."""
         return cls(
             fixture=Fixture.from_json(values["fixture"]),
             folder=Path(values["folder"]),
@@ -67,7 +67,7 @@ class Order:
 
 
 def supervise(order: Order) -> Record:
-    """Play a match as ordered and return what came of it; nothing of it runs afterwards.
+    """Play a match as ordered and return its record; no process of it runs afterwards.
 
     Raises:
         StoppedError: the match is no longer wanted.
@@ -170,7 +170,7 @@ def _is_full(folder: Path) -> bool:
 
 
 def _make_last(folder: Path) -> None:
-    """Have the logs on disk before the match counts as complete."""
+    """Sync the logs to disk before the match counts as complete."""
     for path in folder.glob("*.rc[gl]*"):
         with path.open("rb") as file:
             os.fsync(file.fileno())

@@ -1,4 +1,4 @@
-"""Whether the logs of a match are whole, and which players were missing or silent."""
+"""A check of a match's logs: are they whole, and which players were missing or silent?"""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from teamclone.rcss.server_params import number
 
 
 def read_logs(folder: Path) -> tuple[Match | None, Holes | None, str | None]:
-    """Read the match in a folder: it, its holes, and what is wrong with it; None for each that there is not."""
+    """Read the match in a folder, its holes and the first problem; None for each that is missing."""
     try:
         pairs = find_matches([folder])
         if len(pairs) != 1 or pairs[0].rcg is None or pairs[0].rcl is None:
@@ -36,7 +36,7 @@ def read_logs(folder: Path) -> tuple[Match | None, Holes | None, str | None]:
 def verdict(
     fixture: Fixture, match: Match | None, holes: Holes | None, problem: str | None, *, gave_up: bool
 ) -> FailedError | None:
-    """Judge a match whose server ended by itself: what speaks against it; None where nothing does.
+    """Judge a match whose server ended by itself; return the failure, None where there is none.
 
     Args:
         gave_up: whether the server waited for clients in vain. After the end of a match that does not matter.

@@ -14,9 +14,9 @@ from teamclone.protocol.monitor import Show
 
 LOOPBACK = "127.0.0.1"
 _ASK_S = 0.3
-"""Between two requests to a server that does not answer."""
+"""Seconds between two requests to a server that does not answer."""
 _SILENT_S = 3.0
-"""After which a server that has answered is asked again."""
+"""Seconds after which a server that has answered is asked again."""
 _MOST_DATAGRAMS = 512
 """Read in one go: more than the socket keeps, and an end to a flood."""
 
@@ -60,12 +60,12 @@ class MonitorClient:
         return show
 
     def close(self) -> None:
-        """Leave for good."""
+        """Send the server a farewell and close the socket."""
         self._leave()
         self._socket.close()
 
     def _newest(self) -> Show | None:
-        """The last of the waiting datagrams that is a whole record from the server."""
+        """Return the last of the waiting datagrams that is a whole record from the server."""
         received = []
         for _ in range(_MOST_DATAGRAMS):
             try:

@@ -20,10 +20,10 @@ from teamclone.logs.shows import Shows, read_shows
 from teamclone.rcss.playmodes import PlayMode
 
 MAX_BYTES = 16_384
-"""Of a datagram that is read; a record has about 3,400."""
+"""Most bytes of a datagram that is read; a record has about 3,400."""
 
 _HEAD = re.compile(rb"\(show \d{1,10} \(pm (\d{1,3})\) \(tm ([^\s()]{1,64}) ([^\s()]{1,64}) (\d{1,5}) (\d{1,5})[ )]")
-"""What monitors get and logs have in records of their own: play mode, names and scores."""
+"""Play mode, names and scores, which logs have in records of their own and monitors get in each."""
 _PLACE_SCALE = 16
 """Positions in requests are whole sixteenths of a metre."""
 
@@ -49,17 +49,17 @@ class Show:
 
     @property
     def over(self) -> bool:
-        """Whether the match has ended."""
+        """True once the match has ended."""
         return self.playmode == PlayMode.TIME_OVER
 
     @property
     def begun(self) -> bool:
-        """Whether the clock runs already."""
+        """True once the clock runs."""
         return self.cycle > 0
 
     @property
     def present(self) -> tuple[frozenset[int], frozenset[int]]:
-        """Numbers of the connected players of the left and of the right team; those sent off are among them."""
+        """Numbers of the connected players of the left and of the right team; those sent off included."""
         left, right = (self.players["state"] != 0).reshape(2, -1)
         return (
             frozenset((np.flatnonzero(left) + 1).tolist()),
@@ -90,7 +90,7 @@ def show_of(datagram: bytes) -> Show | None:
 
 
 def load_reader() -> None:
-    """Load what `show_of` needs. It is compiled when it is first used, so call this before time matters."""
+    """Load or compile the kernel of `show_of`, which else happens at its first call; use it before time matters."""
     _read(b" ", 0)
 
 

@@ -1,1 +1,1 @@
-"""What the simulator defines: pitch, parameters, play modes, commands, state bits, the frame of reference. No I/O."""
+"""Definitions of the simulator: pitch, parameters, play modes, commands, state bits, frame of reference. No I/O."""

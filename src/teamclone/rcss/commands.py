@@ -66,7 +66,7 @@ CLONED_KINDS = (CommandKind.DASH, CommandKind.TURN, CommandKind.KICK, CommandKin
 """The commands a model predicts by default, in the order of its output classes (Table II of the paper)."""
 
 CLONED = tuple(kind.name.lower() for kind in CLONED_KINDS)
-"""The same as words."""
+"""CLONED_KINDS as words."""
 
 REPERTOIRE = (*CLONED, "catch", "move", "none")
 """All that a dataset may have and a model predict, in this order; ``none`` is a cycle without a body command.
@@ -76,7 +76,7 @@ Every dataset and every model has the first four, so that places of these and of
 
 
 def not_of_repertoire(commands: tuple[str, ...]) -> str | None:
-    """What the commands of a dataset or model have to be, and what these are; None where they can be these."""
+    """Return an error text about commands that no dataset or model can have; None where they can be used."""
     further = REPERTOIRE[len(CLONED) :]
     if commands == (*CLONED, *(name for name in further if name in commands)):
         return None
@@ -98,7 +98,7 @@ class Parameter:
 
     @property
     def sided(self) -> bool:
-        """Whether it changes its sign where left and right are exchanged."""
+        """True if it changes its sign where left and right are exchanged."""
         return self.angle or self.name == "move_y"
 
 
@@ -121,8 +121,9 @@ _FURTHER = (
 
 @cache
 def parameters_of(commands: tuple[str, ...]) -> tuple[Parameter, ...]:
-    """The parameters of some of REPERTOIRE, PARAMETERS first; those of a move are places as the mover's team sees them.
+    """Return the parameters of some of REPERTOIRE, PARAMETERS first.
 
-    The server turns the place of a right team's move (rcssserver `player.cpp`), so it stays as it was sent.
+    Those of a move are a place in the frame of the mover's team. The server turns the place of a right team's move
+    (rcssserver `player.cpp`), so it stays as it was sent.
     """
     return (*PARAMETERS, *(item for item in _FURTHER if item.kind.name.lower() in commands))

@@ -18,7 +18,7 @@ DEFAULTS: dict[str, float] = {
     "foul_detect_probability": 0.5,
     "catchable_area_l_stretch": 1.0,
 }
-"""Type 0 on a server with default parameters; also what older logs leave out."""
+"""Type 0 on a server with default parameters; also the values that older logs leave out."""
 
 FIELDS = tuple(DEFAULTS)
 """The order of a type's parameters wherever they stand in an array."""
@@ -28,7 +28,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "kick": ("kickable_margin", "kick_rand"),
     "stamina": ("stamina_inc_max", "extra_stamina", "effort_max"),
 }
-"""The eight parameters that vary freely between types, by what they change. effort_min is effort_max - 0.4."""
+"""The eight parameters that vary freely between types, by their effect. effort_min is effort_max - 0.4."""
 
 RANGES: dict[str, tuple[float, float]] = {
     "dash_power_rate": (0.0048, 0.0068),
@@ -40,4 +40,4 @@ RANGES: dict[str, tuple[float, float]] = {
     "extra_stamina": (50.0, 100.0),
     "effort_max": (0.8, 1.0),
 }
-"""What the server draws with default player parameters; projects a type onto [-1, 1]."""
+"""The ranges from which the server draws with default player parameters; they project a type onto [-1, 1]."""

@@ -1,4 +1,4 @@
-"""How many players there are. The player axis of every array has the left or own team's 11 first."""
+"""Numbers of players. The player axis of every array has the left or own team's 11 first."""
 
 from __future__ import annotations
 

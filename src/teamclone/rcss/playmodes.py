@@ -75,12 +75,14 @@ MOVE_MODES = (
     PlayMode.FREE_KICK_L,
     PlayMode.FREE_KICK_R,
 )
-"""Where the server takes a ``move``, in a free kick from a goalkeeper who holds the ball; elsewhere it ignores it and
-the player's slot stays free (rcssserver `player.cpp`, move)."""
+"""Play modes in which the server takes a ``move``, in a free kick only from a goalkeeper that holds the ball.
+
+In others it ignores it and the player's slot stays free (rcssserver `player.cpp`, move).
+"""
 
 
 class Situation(IntEnum):
-    """What a play mode means for the players, whichever team's it is."""
+    """The meaning of a play mode for the players, whichever team's it is."""
 
     OTHER = 0
     """No play: over, paused, or a penalty shoot-out, for which all but two players wait in the middle."""
@@ -126,7 +128,7 @@ def _restarts(mode: PlayMode) -> int:
 SITUATION = np.zeros(256, np.uint8)
 """(256,) the Situation of each play mode by its id."""
 RESTARTS = np.zeros(256, np.int8)
-"""(256,) whose restart it is or will be: 1 of the left team, -1 of the right one, 0 of none.
+"""(256,) the team that restarts or will: 1 the left team, -1 the right one, 0 none.
 
 Names of goals and faults are of the team that did it; the other one restarts.
 """

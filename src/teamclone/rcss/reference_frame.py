@@ -12,16 +12,22 @@ from numpy.typing import NDArray
 
 
 def rotate_point(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Positions in metres or velocities in metres per cycle, any shape, seen from the other side. Its own inverse."""
+    """Return positions in metres or velocities in metres per cycle seen from the other side.
+
+    Any shape; its own inverse.
+    """
     return -values
 
 
 def rotate_angle(degrees: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Global directions in degrees, any shape, seen from the other side, in [-180, 180). Its own inverse modulo 360."""
+    """Return global directions in degrees seen from the other side, in [-180, 180).
+
+    Any shape; its own inverse modulo 360.
+    """
     return wrap_degrees(degrees + 180.0)
 
 
 def wrap_degrees(degrees: NDArray[np.floating]) -> NDArray[np.floating]:
-    """The same directions in [-180, 180)."""
+    """Return directions in degrees, any shape, in [-180, 180)."""
     wrapped: NDArray[np.floating] = np.mod(degrees + 180.0, 360.0) - 180.0
     return wrapped

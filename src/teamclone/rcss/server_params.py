@@ -1,7 +1,7 @@
-"""Parameters of the server that decide what happens in a cycle, with their defaults (rcssserver `serverparam.cpp`).
+"""Parameters of the server that enter the computations of a cycle, with their defaults (rcssserver `serverparam.cpp`).
 
 A log names those of its match, and every computation takes them from there: `number` and `vector` give the default of
-a version only for what a log leaves out. Datasets hold them in the order of `FIELDS`: after a change here raise
+a version only where a log leaves one out. Datasets hold them in the order of `FIELDS`: after a change here raise
 `dataset.layout.FORMAT`.
 """
 
@@ -19,7 +19,7 @@ DEFAULTS: dict[str, float] = {
     "ball_rand": 0.05,
     "ball_speed_max": 3.0,
     "ball_accel_max": 2.7,
-    # Players, beside what their type says (`player_types`).
+    # Players, beside their type (`player_types`).
     "player_rand": 0.1,
     "player_accel_max": 1.0,
     "kick_rand": 0.1,
@@ -69,7 +69,7 @@ DEFAULTS: dict[str, float] = {
     "nr_extra_halfs": 2.0,
     "simulator_step": 100.0,
 }
-"""Those of version 19."""
+"""Defaults of version 19."""
 
 _BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
     (17, {"back_dash_rate": 0.6, "min_catch_angle": -180.0, "max_catch_angle": 180.0, "min_dash_power": -100.0}),
@@ -77,7 +77,7 @@ _BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
 """Defaults of servers before a version, where they differ."""
 
 OLDEST = 16
-"""The version whose defaults stand for all before it. A log that leaves a parameter out is most likely that old."""
+"""The version whose defaults are used for all before it. A log without a parameter is most likely that old."""
 
 FIELDS = tuple(DEFAULTS)
 """The order of the parameters wherever they stand in an array, ``World.server``."""
@@ -85,11 +85,11 @@ SERVER_FIELD = {name: index for index, name in enumerate(FIELDS)}
 """Index of a parameter there."""
 
 SERVER_DEFAULTS = np.array(list(DEFAULTS.values()))
-"""(len(FIELDS),) float64, DEFAULTS as `vector` has them."""
+"""(len(FIELDS),) float64, DEFAULTS in the order of `FIELDS`."""
 
 
 def default(name: str, *, version: int | None = None) -> float:
-    """The default of a parameter in a version of the server, the newest if None."""
+    """Return the default of a parameter in a version of the server, the newest if None."""
     for before, values in _BEFORE:
         if version is not None and version < before and name in values:
             return values[name]
@@ -97,11 +97,11 @@ def default(name: str, *, version: int | None = None) -> float:
 
 
 def number(params: Mapping[str, float | str], name: str, *, version: int | None = None) -> float:
-    """A parameter of a match: what its log says, the default of its server's version where the log has no number."""
+    """Return a parameter of a match: the number in its log, else the default of its server's version."""
     value = params.get(name)
     return float(value) if isinstance(value, int | float) else default(name, version=version)
 
 
 def vector(params: Mapping[str, float | str], *, version: int | None = None) -> NDArray[np.float64]:
-    """(len(FIELDS),) all of FIELDS of a match, as `number` has them."""
+    """Return (len(FIELDS),) all of FIELDS of a match, each by `number`."""
     return np.array([number(params, name, version=version) for name in FIELDS])

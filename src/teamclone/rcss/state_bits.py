@@ -1,6 +1,6 @@
 """Bits of a player's ``state`` column (rcssserver `types.h`, PlayerState).
 
-Bits that speak of a command (KICK, CATCH, TACKLE and their faults) stand in the frame *after* the command.
+Bits about a command (KICK, CATCH, TACKLE and their faults) are set in the frame *after* the command.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def write_figure(search: Search) -> None:
 
 
 def _value(search: Search, trial: Trial) -> float:
-    """The objective; accuracy in percent."""
+    """Return the objective; accuracy in percent."""
     return _shown(search, trial.figures[search.config.objective.figure])
 
 
@@ -50,7 +50,7 @@ def _label(search: Search) -> str:
 
 
 def _beam(search: Search, figure: Figure) -> None:
-    """The objective against the weights, each architecture tied to the one it was made from, and how the best came."""
+    """Draw the objective against the weights, each architecture tied to its parent, and the path to the best."""
     axes: Axes = figure.subplots()
     trials = {trial.name: trial for trial in search.trials if trial.figures}
     place = {name: (trial.figures["weights"], _value(search, trial)) for name, trial in trials.items()}
@@ -77,7 +77,7 @@ def _beam(search: Search, figure: Figure) -> None:
 
 
 def _ancestry(search: Search) -> list[str]:
-    """The best trial's ancestors, the first one first, and itself."""
+    """Return the best trial's ancestors, the first one first, and itself."""
     trials = {trial.name: trial for trial in search.trials}
     path = [search.ranked()[0].name]
     while parent := trials[path[-1]].parent:
@@ -86,7 +86,7 @@ def _ancestry(search: Search) -> list[str]:
 
 
 def _study(search: Search, figure: Figure) -> None:
-    """The objective of every trial in the order of the trials, and the best so far."""
+    """Draw the objective of every trial in the order of the trials, and the best so far."""
     axes: Axes = figure.subplots()
     trials = [(number, trial) for number, trial in enumerate(search.trials) if trial.figures]
     finished = [spot for spot in trials if spot[1].status is Status.FINISHED]
@@ -108,7 +108,7 @@ def _study(search: Search, figure: Figure) -> None:
 
 
 def _optimisers(search: Search, figure: Figure) -> None:
-    """Bars of the objective by learning rate, and how each came there."""
+    """Draw bars of the objective by learning rate, and each curve."""
     bars, curves = figure.subplots(1, 2, sharey=True)
     trials = [trial for trial in search.trials if trial.figures]
     values = [_value(search, trial) for trial in trials]

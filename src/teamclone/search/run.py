@@ -1,7 +1,6 @@
 """Search for settings by many trainings over one dataset.
 
-The next trial follows from the trials so far alone, so that a search that was stopped goes on as if nothing had
-happened.
+The next trial follows from the trials so far alone, so that a search that was stopped resumes without a difference.
 """
 
 from __future__ import annotations
@@ -40,14 +39,17 @@ def search(
     jobs: int = 1,
     on_progress: Callable[[Search], None] = lambda search: None,
 ) -> Search:
-    """Search, or go on with a search, and draw its figure; `trials` describes the folder.
+    """Begin or resume a search, and draw its figure; `trials` describes the folder.
 
     Args:
+        config: what to vary, and the settings that all trials share.
+        dataset: the dataset that all trials train on.
+        out: folder of the search; it may hold one that was stopped.
         jobs: processes that train at a time. Where ``train.threads`` is 0 they share the processors.
         on_progress: called whenever a trial begins, finishes an epoch, or ends.
 
-    A trial that fails is noted and the others go on; it is tried again when the search is gone on with. Finished
-    trials are kept, unfinished ones go on from their last epoch with what is left of ``train.max_minutes``.
+    A trial that fails is noted and the others go on; it is tried again when the search is resumed. Finished
+    trials are kept, unfinished ones go on from their last epoch with the rest of ``train.max_minutes``.
 
     Raises:
         UsageError: options that do not go together, or a dataset of other commands than the model's.
@@ -83,7 +85,7 @@ def search(
 
 
 def _begin(config: SearchConfig, dataset: Dataset, folder: Path) -> Search:
-    """A new search, or the one in the folder with what is to be done again waiting."""
+    """Return a new search, or the one in the folder, with unfinished and failed trials waiting."""
     of = {"id": dataset.id, "path": str(dataset.path), "team": str(dataset.meta["team"])}
     if not (folder / "search.json").exists():
         return Search(path=folder, config=config, dataset=of, trials=[])
@@ -137,7 +139,7 @@ def _run(state: Search, strategy: Strategy, crew: list[Worker], on_progress: Cal
 
 
 def _next(state: Search, strategy: Strategy) -> Trial | None:
-    """The next trial to run, proposed now if none is waiting."""
+    """Return the next trial to run, proposed now if none is waiting."""
     waiting = [trial for trial in state.trials if trial.status is Status.WAITING]
     if not waiting:
         waiting = strategy.propose(state.trials)

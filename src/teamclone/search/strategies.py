@@ -1,4 +1,4 @@
-"""What to try next, and whether to give a trial up: pure functions of the trials so far."""
+"""The choice of the next trials and of those to give up: pure functions of the trials so far."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from teamclone.training.config import WITH_ADAM, TrainConfig
 OPTIMISERS = ("adam", "rmsprop", "adagrad")
 
 RATES = (1e-2, 1e-3, 1e-4)
-"""What the paper compared."""
+"""Learning rates that the paper compared."""
 
 BATCH_FACTORS = (0.25, 0.5, 1, 2)
 """Batch sizes that a study tries, as multiples of that of the settings it starts from."""
 
 PRUNE_TRIALS, PRUNE_EPOCHS = 5, 2
-"""A study gives no trial up before so many were finished, nor in its first epochs, so many."""
+"""A study prunes only once PRUNE_TRIALS trials have finished, and no trial in its first PRUNE_EPOCHS epochs."""
 
 
 class Strategy(Protocol):
-    """What to try."""
+    """The rule by which a search chooses its trials."""
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
-        """Trials to add now; none as long as the running ones decide, or at the end."""
+        """Return trials to add now; none as long as the running ones decide, or at the end."""
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
-        """Whether to give up a running trial after the epoch it has just finished."""
+        """Return whether to give up a running trial after the epoch it has just finished."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,12 @@ class Beam:
             if not hidden or not self._fits(hidden)
         ]
         if "model.hidden" in config.held:
-            problems.append("the beam search chooses model.hidden; say where it starts with --start")
+            problems.append("the beam search chooses model.hidden; set its first architectures with --start")
         if problems:
             raise UsageError("; ".join(problems))
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return the first architectures, then, whenever all trials have ended, the untried neighbours of the beam."""
         if not trials:
             widths = [1 << bits for bits in range(self.config.largest.bit_length())]
             first = self.config.start or [(width,) for width in widths if width >= self.config.smallest]
@@ -88,10 +89,11 @@ class Beam:
         return [self._trial(hidden, step=step, parent=parent) for hidden, parent in found.items()]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
+        """Return False: every trial is trained to its end."""
         return False
 
     def beams(self, trials: Sequence[Trial]) -> list[list[Trial]]:
-        """The beam after each step, best first."""
+        """Return the beam after each step, best first."""
         last = max((trial.step for trial in trials), default=-1)
         return [
             rank(
@@ -102,7 +104,10 @@ class Beam:
         ]
 
     def neighbours(self, hidden: tuple[int, ...]) -> list[tuple[int, ...]]:
-        """A layer more, as wide as the last or half of it; one layer doubled or halved; the last one dropped."""
+        """Return the neighbours of an architecture.
+
+        A layer more, as wide as the last or half of it; one layer doubled or halved; the last one dropped.
+        """
         found = [(*hidden, hidden[-1]), (*hidden, hidden[-1] // 2)]
         for place, width in enumerate(hidden):
             found += [(*hidden[:place], other, *hidden[place + 1 :]) for other in (2 * width, width // 2)]
@@ -140,6 +145,7 @@ class Study:
             raise UsageError("--set holds every setting that the study varies; leave one of them out")
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return one trial with settings that Optuna chose; none once there are ``config.trials`` of them."""
         if len(trials) >= self.config.trials:
             return []
         base, chosen = self.config.base, self._study(trials).ask(self.space()).params
@@ -155,11 +161,12 @@ class Study:
         return [Trial(name=f"{len(trials):04d}", settings=settings)]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
+        """Return whether Optuna's median pruner would give the trial up."""
         study = self._study(trials)
         return bool(study.pruner.prune(study, self._frozen(trial)))
 
     def space(self) -> dict[str, Any]:
-        """What is varied: distributions by setting. Samples of an epoch and of validation stay as many."""
+        """Return the distributions by setting. The samples of an epoch and of validation stay as many."""
         from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
         base = self.config.base
@@ -223,6 +230,7 @@ class Optimisers:
             raise UsageError(f"the comparison of optimisers chooses {' and '.join(chosen)}; leave --set of it out")
 
     def propose(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return every pair of `OPTIMISERS` and `RATES` at first; none afterwards."""
         if trials:
             return []
         usual = TrainConfig()
@@ -239,6 +247,7 @@ class Optimisers:
         ]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
+        """Return False: every trial is trained to its end."""
         return False
 
 

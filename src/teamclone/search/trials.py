@@ -24,13 +24,15 @@ FORMAT = 2
 
 
 class Mode(StrEnum):
+    """How a search chooses its trials; each value has a strategy in `search.strategies`."""
+
     BEAM = "beam"
     STUDY = "study"
     OPTIMISERS = "optimisers"
 
 
 class Objective(StrEnum):
-    """The figure on the validation matches that a search looks for; of a trial that of its best epoch."""
+    """The figure on the validation matches that a search optimises; a trial's is that of its best epoch."""
 
     ACCURACY = "accuracy"
     CROSS_ENTROPY = "cross-entropy"
@@ -42,11 +44,13 @@ class Objective(StrEnum):
 
     @property
     def sign(self) -> int:
-        """Times this more is better."""
+        """1 if more is better, else -1."""
         return 1 if self is Objective.ACCURACY else -1
 
 
 class Status(StrEnum):
+    """How far a trial is; ``pruned``: given up after an epoch that promised too little."""
+
     WAITING = "waiting"
     RUNNING = "running"
     FINISHED = "finished"
@@ -66,7 +70,7 @@ class Trial:
         settings: where it differs from the settings that all share: ``{"model.hidden": [256, 128]}``.
         step: of a beam search, from 0.
         parent: the trial whose neighbour this one is, in a beam search.
-        status: ``waiting`` also for one that was stopped and goes on when the search does.
+        status: ``waiting`` also for one that was stopped and resumes with the search.
         figures: ``accuracy``, ``cross_entropy`` (nats) and ``loss`` on the validation matches after the best ``epoch``;
             ``epochs`` gone through and their ``seconds``; ``weights``, how many the network has.
         curve: the objective after each epoch.
@@ -83,11 +87,11 @@ class Trial:
     error: str | None = None
 
     def begin(self, status: Status) -> None:
-        """Forget what an earlier attempt came to; its epochs are told again."""
+        """Reset the trial for an attempt; the worker sends earlier epochs again."""
         self.status, self.figures, self.curve, self.error = status, {}, [], None
 
     def add(self, record: dict[str, Any], weights: int, objective: Objective) -> None:
-        """Take the record of an epoch; one that is told again replaces all from there on."""
+        """Take the record of an epoch; one that comes again replaces all from there on."""
         value = float(record[f"validation_{objective.figure}"])
         before = self.curve[: record["epoch"] - 1]
         if not before or value * objective.sign > max(past * objective.sign for past in before):
@@ -100,14 +104,14 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchConfig:
-    """What to search, and how.
+    """The settings of a search.
 
     Attributes:
         mode: see `Mode`.
         base: the settings that trials start from.
-        held: settings that a study leaves as ``base`` has them.
+        held: settings that a study does not vary.
         objective: see `Objective`.
-        beam: of a beam search, how many architectures each step goes on from.
+        beam: of a beam search, the number of architectures kept after each step.
         iterations: of a beam search, how many steps it takes after the first architectures.
         smallest: of a beam search, the least width of a layer; a power of two, as ``largest`` and all widths between.
         largest: of a beam search, the greatest.
@@ -132,14 +136,14 @@ OPTIONS = {
     Mode.STUDY: ("trials",),
     Mode.OPTIMISERS: (),
 }
-"""Options that a mode has; no other mode has them."""
+"""The options of each mode; no option belongs to two."""
 
 MAY_GROW = ("iterations", "trials")
-"""Options that may be otherwise when a search goes on."""
+"""Options that may change when a search is resumed."""
 
 
 def rank(trials: Sequence[Trial], objective: Objective) -> list[Trial]:
-    """Best first: finished ones, then those given up, then failed ones, then the rest; of equals the smaller net."""
+    """Sort trials, best first: finished, given up, failed, then the rest; of equals the smaller network."""
     order = (Status.FINISHED, Status.PRUNED, Status.FAILED, Status.RUNNING, Status.WAITING)
 
     def key(trial: Trial) -> tuple[Any, ...]:
@@ -164,7 +168,7 @@ class Search:
 
     Attributes:
         path: its folder.
-        config: what is searched.
+        config: its settings.
         dataset: ``id``, ``path`` and ``team`` of the dataset.
         trials: in the order in which they were proposed.
     """
@@ -175,7 +179,7 @@ class Search:
     trials: list[Trial]
 
     def ranked(self) -> list[Trial]:
-        """Best first, see `rank`."""
+        """Return the trials, best first, see `rank`."""
         return rank(self.trials, self.config.objective)
 
     def save(self) -> None:

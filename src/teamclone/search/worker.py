@@ -1,7 +1,7 @@
 """Processes that train the trials of a search, one trial at a time each.
 
-They are no tasks of `system.workers`: a process keeps its dataset open from trial to trial, reports every epoch, and is
-told in return whether to give the trial up.
+They are no tasks of `system.workers`: a process keeps its dataset open from trial to trial, reports every epoch, and
+learns in return whether to give the trial up.
 """
 
 from __future__ import annotations
@@ -31,18 +31,22 @@ from teamclone.training.run import is_run, open_run, save_config
 
 
 class Task(NamedTuple):
+    """A trial to train: its settings and the folder of its run, which may hold an earlier attempt to resume."""
+
     config: Config
     folder: Path
 
 
 class Epoch(NamedTuple):
-    """An epoch was finished; the worker waits to be told whether to give the trial up."""
+    """An epoch was finished; the worker waits for `Worker.answer`, whether to give the trial up."""
 
     record: dict[str, Any]
     weights: int
 
 
 class Ended(NamedTuple):
+    """The end of a trial; ``error`` is None unless it failed."""
+
     status: Status
     error: str | None
 
@@ -64,6 +68,7 @@ class Worker:
         theirs.close()
 
     def give(self, trial: Trial, config: Config, folder: Path) -> None:
+        """Send a trial to the process, which is started anew if it died; `take` then returns its messages."""
         if not self.process.is_alive():
             self.stop()
             self._start()
@@ -71,7 +76,7 @@ class Worker:
         self.connection.send(Task(config, folder))
 
     def take(self) -> tuple[Trial, Epoch | Ended]:
-        """What the worker says of its trial, once there is something to take."""
+        """Return the worker's next message and its trial; waits for it."""
         trial = self.trial
         assert trial is not None
         try:
@@ -85,6 +90,7 @@ class Worker:
         return trial, message
 
     def answer(self, *, prune: bool) -> None:
+        """Reply to an `Epoch`: whether to give the trial up."""
         with suppress(OSError):  # a process that has just died is noticed by `take`
             self.connection.send(prune)
 
@@ -97,7 +103,7 @@ class Worker:
 
 @contextmanager
 def _no_interrupts() -> Iterator[None]:
-    """Leave Ctrl-C to this process: what is started meanwhile never sees it, also while it still imports."""
+    """Leave Ctrl-C to this process: one that is started meanwhile never gets it, even while it imports."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -109,11 +115,11 @@ def _no_interrupts() -> Iterator[None]:
 
 
 class _PrunedError(Exception):
-    """Leaves `loop.train`."""
+    """Raised inside `loop.train` to leave it."""
 
 
 def _work(connection: Connection[Any, Any], dataset_path: Path) -> None:
-    """Train what comes in until the other end closes."""
+    """Train the trials that arrive until the other end closes."""
     start_worker()
     dataset = open_dataset(dataset_path)
     while True:
@@ -125,7 +131,7 @@ def _work(connection: Connection[Any, Any], dataset_path: Path) -> None:
             ended = _train(task, dataset, connection)
         except TeamcloneError as error:
             ended = Ended(Status.FAILED, str(error))
-        except (EOFError, BrokenPipeError):  # nobody is there to tell
+        except (EOFError, BrokenPipeError):  # the other end is gone
             return
         except Exception as error:
             ended = Ended(Status.FAILED, f"{type(error).__name__}: {error}")
@@ -137,14 +143,14 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
     config, folder = task
     weights = parameter_count(Clone(config.model))
 
-    def tell(record: dict[str, Any]) -> None:
+    def send(record: dict[str, Any]) -> None:
         connection.send(Epoch(record, weights))
         if connection.recv():
             raise _PrunedError
 
     def report(progress: loop.Progress) -> None:
         if progress.record is not None:
-            tell(progress.record)
+            send(progress.record)
 
     resume, left = is_run(folder), config.train.max_minutes
     try:
@@ -152,7 +158,7 @@ def _train(task: Task, dataset: Dataset, connection: Connection[Any, Any]) -> En
             run = open_run(folder)
             history = run.history()
             for record in history:
-                tell(record)
+                send(record)
             # Another number of threads would round otherwise than in the epochs before.
             config = replace(config, train=replace(config.train, threads=run.config.train.threads))
             minutes = [record["seconds"] / 60 for record in history]

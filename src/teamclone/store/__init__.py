@@ -1,7 +1,7 @@
 """Many matches as one SQL schema: ingest, query, check.
 
-The schema (``schema``), what becomes of a match (``convert``) and the checks (``checks``) know nothing of where a store
-keeps its rows; ``Store`` is what every back end offers, ``parquet`` is the embedded one and ``postgres`` a server's.
+The schema (``schema``), the rows of a match (``convert``) and the checks (``checks``) know nothing of where a store
+keeps its rows. ``Store`` is the interface of every back end; ``parquet`` is the embedded one, ``postgres`` a server's.
 """
 
 from teamclone.store.ingest import IngestReport, ingest

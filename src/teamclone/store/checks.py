@@ -1,4 +1,4 @@
-"""Queries that must return no row: what cannot be true of a match, whatever its teams did.
+"""Queries that must return no row: impossible facts of a match, whatever its teams did.
 
 Every query selects ``cycle`` and ``what`` (a text) of each row that is wrong, over the tables of one match. Limits that
 are parameters of the server are taken from the match; where its log does not list them they are not checked.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One rule: ``about`` says what must hold."""
+    """One rule; ``about`` is the rule in words."""
 
     name: str
     about: str
@@ -57,7 +57,7 @@ def _parameter(name: str) -> str:
 
 
 def _states(condition: str, shown: str) -> str:
-    """Players on the field for whom ``condition`` is true; ``shown`` is an SQL text."""
+    """Select the players on the field with ``condition``; ``shown`` is an SQL text."""
     return (
         f"select cycle, concat({_PLAYER}, ' has ', {shown}) as what "
         f"from player_states join frames using (match_id, frame) where {_ON_FIELD} and ({condition}) order by frame"
@@ -239,7 +239,7 @@ CHECKS = (
 
 
 def check_match(tables: Mapping[str, pa.Table]) -> list[Finding]:
-    """The rules that the tables of one match break. The tables are those of ``convert.tables_of``."""
+    """Return the rules that the tables of one match break. The tables are those of ``convert.tables_of``."""
     import duckdb
 
     findings = []

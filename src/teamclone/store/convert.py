@@ -28,18 +28,18 @@ Tables = dict[str, pa.Table]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """Hashes of the contents that a match was read from; None for a log that there was not."""
+    """The hashes of the logs that a match was read from."""
 
     game_log: str | None
     command_log: str | None
 
     def cover(self, others: Sources) -> bool:
-        """Whether a store that has these gains nothing by the others."""
+        """Return whether a store that has these sources would gain nothing from ``others``."""
         return self == others or others.command_log is None
 
 
 def sources_of(match: Match) -> Sources:
-    """What a match was read from."""
+    """Return the hashes of the logs that a match was read from."""
     return Sources(
         game_log=match.match_id if match.rcg_path is not None or match.log is None else None,
         command_log=digest(match.log.text) if match.log is not None else None,
@@ -47,7 +47,7 @@ def sources_of(match: Match) -> Sources:
 
 
 def tables_of(match: Match) -> Tables:
-    """All rows of a match."""
+    """Return all rows of a match."""
     made = {
         schema.FRAMES: frame_columns(match),
         schema.PLAYER_STATES: player_columns(match),
@@ -63,7 +63,7 @@ def tables_of(match: Match) -> Tables:
 
 
 def arrow_table(table: Table, values: dict[str, Any], *, match_id: str) -> pa.Table:
-    """Columns of one length (arrays or lists) as rows of a table.
+    """Return columns of one length (arrays or lists) as rows of a table.
 
     ``match_id`` is added, not-a-number made NULL. A zero byte in a text, which no SQL server keeps, becomes the
     replacement character.
@@ -82,7 +82,7 @@ def arrow_table(table: Table, values: dict[str, Any], *, match_id: str) -> pa.Ta
 
 
 def _signed(value: Any) -> Any:
-    """An unsigned array in the signed type that holds it in SQL; anything else as it is."""
+    """Return an unsigned array in the signed type that holds it in SQL; anything else as it is."""
     if isinstance(value, np.ndarray) and value.dtype.name in schema.SIGNED:
         return value.astype(schema.SIGNED[value.dtype.name])
     return value
@@ -96,7 +96,7 @@ def _without_zeros(texts: pa.Array) -> pa.Array:
 
 
 def match_columns(match: Match, tables: Tables) -> dict[str, Any]:
-    """The one row of ``matches``."""
+    """Return the one row of ``matches``."""
     row: dict[str, Any] = {
         "started_at": started_at(match.rcg_path or match.rcl_path),
         "n_frames": tables["frames"].num_rows,
@@ -120,12 +120,15 @@ def match_columns(match: Match, tables: Tables) -> dict[str, Any]:
 
 
 def frame_columns(match: Match) -> dict[str, Any]:
-    """``frames``: (n_frames,)."""
+    """Return the columns of ``frames``: (n_frames,)."""
     return {"frame": np.arange(_n_frames(match), dtype=np.int32), **match.frames}
 
 
 def player_columns(match: Match) -> dict[str, Any]:
-    """``player_states``: the (n_frames, 22) columns row by row, left 1..11 then right 1..11 of each frame."""
+    """Return the columns of ``player_states``.
+
+    The (n_frames, 22) columns row by row, left 1..11 then right 1..11 of each frame.
+    """
     n_frames = _n_frames(match)
     return {
         "frame": np.repeat(np.arange(n_frames, dtype=np.int32), N_PLAYERS),
@@ -136,7 +139,7 @@ def player_columns(match: Match) -> dict[str, Any]:
 
 
 def type_columns(match: Match) -> dict[str, Any]:
-    """``player_types``: (n_types,)."""
+    """Return the columns of ``player_types``: (n_types,)."""
     types = match.game.player_types
     n_types = len(next(iter(types.values()))) if types else 0
     if not n_types:
@@ -145,7 +148,7 @@ def type_columns(match: Match) -> dict[str, Any]:
 
 
 def parameter_columns(match: Match) -> dict[str, Any]:
-    """``parameters``: those of the server, then those of the players, by name."""
+    """Return the columns of ``parameters``: those of the server, then those of the players, by name."""
     scopes = (("server", match.game.server_params), ("player", match.game.player_params))
     rows = [(scope, name, value) for scope, parameters in scopes for name, value in sorted(parameters.items())]
     return {
@@ -157,7 +160,7 @@ def parameter_columns(match: Match) -> dict[str, Any]:
 
 
 def problem_columns(match: Match) -> dict[str, Any]:
-    """``problems``: (n_problems,), by file and place."""
+    """Return the columns of ``problems``: (n_problems,), by file and place."""
     problems = sorted(match.problems, key=_place)
     return {
         "code": [problem.code for problem in problems],
@@ -171,14 +174,14 @@ def problem_columns(match: Match) -> dict[str, Any]:
 
 
 def _place(problem: Problem) -> tuple[Any, ...]:
-    """What sorts problems as ``schema.PROBLEMS.order`` does."""
+    """Return a key that sorts problems by ``schema.PROBLEMS.order``."""
     places = (-1 if place is None else place for place in (problem.byte, problem.line))
     cycle = () if problem.cycle is None else (problem.cycle,)
     return (_name(problem.path) or "", *places, problem.code, problem.text, str(problem.severity), cycle)
 
 
 def command_texts(match: Match) -> pa.Array:
-    """The text of every command (n_commands,), gathered from the log without a Python string each."""
+    """Return the text of every command (n_commands,), gathered from the log without a Python string each."""
     if match.log is None:
         return pa.array([], pa.string())
     start = match.log.commands["text_start"].astype(np.int64)
@@ -196,7 +199,10 @@ def command_texts(match: Match) -> pa.Array:
 
 
 def started_at(path: Path | None) -> datetime | None:
-    """The server's start from a log's name (`20240718101530-A_2-vs-B_1.rcg`; servers before 15.2 leave seconds out)."""
+    """Return the server's start from a log's name, ``20240718101530-A_2-vs-B_1.rcg``; None where it has none.
+
+    Servers before 15.2 leave the seconds out.
+    """
     found = re.match(r"(\d{12})(\d{2})?-", path.name) if path is not None else None
     if found is None:
         return None
@@ -207,7 +213,7 @@ def started_at(path: Path | None) -> datetime | None:
 
 
 def numpy_columns(table: Table, rows: pa.Table) -> Columns:
-    """Rows (all columns or some) as NumPy columns, typed as in ``Match``: NULL is NaN, text an object array.
+    """Return rows (all columns or some) as NumPy columns, typed as in ``Match``: NULL is NaN, text an object array.
 
     The columns of ``player_states`` come back in the shape (n_frames, 22).
     """
@@ -226,7 +232,7 @@ def numpy_columns(table: Table, rows: pa.Table) -> Columns:
 
 
 def parameters(rows: pa.Table) -> dict[str, dict[str, float | str]]:
-    """The table ``parameters`` of one match by scope and name."""
+    """Return the table ``parameters`` of one match by scope and name."""
     found: dict[str, dict[str, float | str]] = {"server": {}, "player": {}}
     for row in rows.to_pylist():
         found[row["scope"]][row["name"]] = row["value"] if row["text"] is None else row["text"]
@@ -238,5 +244,5 @@ def _n_frames(match: Match) -> int:
 
 
 def _name(path: Path | None) -> str | None:
-    """A file name that every writer takes: bytes that are no UTF-8 become the replacement character."""
+    """Return a file name that every writer takes: bytes that are no UTF-8 become the replacement character."""
     return None if path is None else path.name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")

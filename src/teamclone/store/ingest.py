@@ -25,7 +25,7 @@ OnProgress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IngestReport:
-    """What an ingest did.
+    """The result of an ingest.
 
     Attributes:
         files: the status of every file that was named, by path, also of those that were in the store before.
@@ -40,10 +40,11 @@ class IngestReport:
     seconds: float
 
     def count(self, outcome: FileOutcome) -> int:
-        """Files with this outcome."""
+        """Return the number of files with this outcome."""
         return sum(status.outcome is outcome for status in self.files)
 
     def to_json(self) -> dict[str, Any]:
+        """Return the counts, the seconds and the status of each file, as ``teamclone ingest --json`` prints them."""
         return {
             "matches": {"added": self.added, "replaced": self.replaced, "unchanged": self.unchanged},
             "files": {str(outcome): self.count(outcome) for outcome in FileOutcome},
@@ -85,15 +86,17 @@ def ingest(
 
     Args:
         paths: logs and folders; a log finds its partner, folders are searched through.
+        store: the store to add to.
         executor: where matches are read, for example on a cluster (``cluster.executor_of``); its workers must see the
             logs and the store under the same paths. None starts processes on this machine.
         jobs: how many, None for one a processor. More than one needs the usual ``if __name__ == "__main__"`` guard.
-        strict: stop at the first file from which something is lost; what was added before stays.
+        strict: stop at the first file from which something is lost; matches added before stay.
+        on_progress: called with the matches that are done and their number.
 
     Raises:
         UsageError: a path does not exist, here or for a worker, or there is no log under any of them.
         StoreError: the store cannot be written, or a worker does not see it.
-        ClusterError: the connection to the executor's workers was lost; what was added stays.
+        ClusterError: the connection to the executor's workers was lost; matches added before stay.
         LogError: with ``strict``, the first thing that was wrong.
     """
     start = time.monotonic()
@@ -146,12 +149,12 @@ def ingest(
 
 
 def files_of(pair: LogPair) -> tuple[Path, ...]:
-    """The one or two files of a match."""
+    """Return the one or two files of a match."""
     return tuple(path for path in (pair.rcg, pair.rcl) if path is not None)
 
 
 def _up_to_date(pair: LogPair, *, known: dict[str, FileStatus], present: set[str]) -> tuple[FileStatus, ...] | None:
-    """The status rows of a pair that needs no reading; None if it does."""
+    """Return the status rows of a pair that needs no reading; None if it does."""
     statuses = []
     for path in files_of(pair):
         status = known.get(str(path.absolute()))
@@ -164,7 +167,7 @@ def _up_to_date(pair: LogPair, *, known: dict[str, FileStatus], present: set[str
 
 
 def _ingest_one(task: _Task) -> _Result:
-    """Runs in a worker: read one match and add it to the store."""
+    """Read one match and add it to the store; runs in a worker."""
     # Looked at before reading, so that a file that grows meanwhile is read again next time.
     stamps = {path: stamp(path) for path in files_of(task.pair)}
     try:
@@ -193,7 +196,7 @@ def _ingest_one(task: _Task) -> _Result:
 
 
 def _check_seen(result: _Result) -> None:
-    """A log that is here but not there is a mistake of the cluster, which would cost every match."""
+    """Raise if this machine sees a log that the worker did not: else a wrong mount would cost every match."""
     for status in result.statuses:
         if status.size < 0 and Path(status.path).exists():
             raise UsageError(
@@ -203,7 +206,7 @@ def _check_seen(result: _Result) -> None:
 
 
 def _status(match: Match, path: Path, stamped: tuple[int, int]) -> FileStatus:
-    """What was read from one of a match's files."""
+    """Return the status row of one of a match's files."""
     wrong = [
         problem for problem in match.problems if problem.path in (None, path) and problem.severity is not Severity.NOTE
     ]
@@ -251,7 +254,7 @@ def _died(task: _Task) -> _Result:
 
 
 def _forget_superseded(store: Store, statuses: tuple[FileStatus, ...], *, known: dict[str, FileStatus]) -> None:
-    """A file that changed gives another match: drop the one it gave before, unless another file still gives it."""
+    """Drop the match that a changed file gave before, unless another file still gives it."""
     now = {status.path: status for status in statuses}
     before = {known[path].match_id for path in now if path in known} - {status.match_id for status in statuses} - {None}
     for match_id in before:

@@ -1,4 +1,4 @@
-"""Which kind of store a location names."""
+"""Opening a store by its location."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from teamclone.store.store import Store
 
 
 def create_store(location: str | Path) -> Store:
-    """The store in this folder, or in the schema that a URL ``postgresql://...`` names; made if there is none.
+    """Return the store in this folder, or in the schema that a URL ``postgresql://...`` names; made if there is none.
 
     Raises:
         StoreError: there is something else, or a store of another format; the server cannot be reached or refuses.
@@ -24,7 +24,7 @@ def create_store(location: str | Path) -> Store:
 
 
 def open_store(location: str | Path) -> Store:
-    """The store in this folder, or in the schema that a URL ``postgresql://...`` names.
+    """Return the store in this folder, or in the schema that a URL ``postgresql://...`` names.
 
     Raises:
         StoreError: there is none, or it is of another format; the text names the numbers and the remedy. Or the server
@@ -39,12 +39,12 @@ def open_store(location: str | Path) -> Store:
 
 
 def is_store(location: Path) -> bool:
-    """Whether this folder was made by ``create_store``, of whatever format."""
+    """Return whether this folder was made by ``create_store``, of whatever format."""
     return (location / MARKER).is_file()
 
 
 def _url(location: str | Path) -> str | None:
-    """The location if it is a server's, else None.
+    """Return the location if it is a server's, else None.
 
     Raises:
         UsageError: it is the URL of something else.

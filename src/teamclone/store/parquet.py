@@ -1,4 +1,4 @@
-"""The embedded store: one folder of Parquet files a match, asked through DuckDB."""
+"""The embedded store: one folder of Parquet files a match, queried through DuckDB."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ParquetStore(Store):
     """A store in a folder. The layout is described by ``schema.markdown()``."""
 
     def __init__(self, root: Path) -> None:
-        """Of a folder that is known to be a store; use ``open`` or ``create``."""
+        """Name a folder that is known to be a store; use ``open`` or ``create``."""
         self.root = root.absolute()
         self._matches = self.root / "matches"
         self._files = self.root / "files"
@@ -60,12 +60,18 @@ class ParquetStore(Store):
 
     @property
     def location(self) -> str:
+        """The store's folder, absolute."""
         return str(self.root)
 
     # -- opening ---------------------------------------------------------------------------------------------------
 
     @classmethod
     def open(cls, root: Path) -> ParquetStore:
+        """Open the store in a folder.
+
+        Raises:
+            StoreError: there is none, it is not teamclone's, or its format is another one.
+        """
         marker = root / MARKER
         try:
             found = json.loads(marker.read_bytes())
@@ -83,6 +89,11 @@ class ParquetStore(Store):
 
     @classmethod
     def create(cls, root: Path) -> ParquetStore:
+        """Make a store in a new or empty folder, or open the one that is there.
+
+        Raises:
+            StoreError: the folder holds other things, is a file, or cannot be written.
+        """
         if (root / MARKER).exists():
             return cls.open(root)
         if root.exists() and not root.is_dir():
@@ -102,12 +113,15 @@ class ParquetStore(Store):
     # -- reading ---------------------------------------------------------------------------------------------------
 
     def match_ids(self) -> list[str]:
+        """Return the ids of the matches, sorted."""
         return sorted(entry.name for entry in os.scandir(self._matches) if entry.is_dir())
 
     def matches(self) -> pa.Table:
+        """Return the table ``matches``, by start, file name and id."""
         return self.sql("select * from matches order by started_at nulls last, game_log, match_id")
 
     def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read a match's rows of one table from its Parquet file; see `Store.read_table`."""
         wanted = schema.table(table)
         names = [field.name for field in wanted.select(columns)]
         path = self._matches / match_id / f"{table}.parquet"
@@ -121,6 +135,7 @@ class ParquetStore(Store):
             raise StoreError(f"{path}: cannot be read ({first_line(error)}); {_remedy(path)}") from error
 
     def stream(self, query: str) -> QueryRows:
+        """Answer a query with DuckDB; see `Store.stream`."""
         connection = self._connect()
         try:
             statements = duckdb.extract_statements(query)
@@ -137,7 +152,7 @@ class ParquetStore(Store):
         return QueryRows(reader.schema, _batches(reader))
 
     def _connect(self) -> duckdb.DuckDBPyConnection:
-        """A database in memory with the views: the store may be read-only, moved, or growing meanwhile."""
+        """Return a database in memory with the views, since the store may be read-only, moved, or growing."""
         connection = duckdb.connect(
             config={
                 "temp_directory": str(Path(tempfile.gettempdir()) / f"teamclone-duckdb-{os.getpid()}"),
@@ -150,13 +165,14 @@ class ParquetStore(Store):
         return connection
 
     def _views(self) -> list[str]:
-        """Statements that define all tables over the files that are there now."""
+        """Return statements that define all tables over the files that are there now."""
         empty = not self.match_ids()
         return [_view(table, None if empty else self._matches) for table in schema.TABLES]
 
     # -- writing ---------------------------------------------------------------------------------------------------
 
     def add(self, match: Match) -> Added:
+        """Write a match to a folder of its own, then move it among the matches in one step; see `Store.add`."""
         sources = convert.sources_of(match)
         home = self._matches / match.match_id
         known = self._sources(match.match_id)
@@ -173,7 +189,7 @@ class ParquetStore(Store):
                 try:
                     folder.rename(home)
                 except OSError as error:
-                    # The same match came from two files at once, and the other was first.
+                    # Two files of one match were read at once, and the other was first.
                     if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
                         raise
                     return Added.UNCHANGED
@@ -183,6 +199,7 @@ class ParquetStore(Store):
         return Added.ADDED if known is None else Added.REPLACED
 
     def remove(self, match_id: str) -> None:
+        """Delete a match's folder; nothing happens where there is none."""
         # Away in one step, so that no reader finds half a match; the name is new, the folder may be left over.
         grave = self._unfinished / f"{match_id}-{uuid.uuid4().hex}"
         with suppress(FileNotFoundError):
@@ -190,13 +207,14 @@ class ParquetStore(Store):
         shutil.rmtree(grave, ignore_errors=True)
 
     def _sources(self, match_id: str) -> Sources | None:
-        """What a match was read from; None if the store has not got it."""
+        """Return the hashes that a match was read from; None if the store has not got it."""
         try:
             return Sources(**json.loads((self._matches / match_id / "meta.json").read_bytes())["sources"])
         except (FileNotFoundError, ValueError, KeyError, TypeError):
             return None
 
     def files(self) -> list[FileStatus]:
+        """Return the status of every source file, by path; rows that cannot be read are left out."""
         found = []
         for path in self._files.glob("*.json"):
             # A row that cannot be read only costs reading its file again.
@@ -205,12 +223,14 @@ class ParquetStore(Store):
         return sorted(found, key=lambda status: status.path)
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
+        """Write one JSON document for each status."""
         with _writing(self.root):
             for status in statuses:
                 write_document(self._files / f"{status.key}.json", status.to_json())
 
     @contextmanager
     def writing(self) -> Iterator[None]:
+        """Hold the store's lock while an ingest writes; see `Store.writing`."""
         with _writing(self.root):
             lock = self.root / ".lock"
             lock.touch()
@@ -225,7 +245,7 @@ class ParquetStore(Store):
                     self._renew_database()
 
     def _tidy(self) -> None:
-        """Throw away what a killed writer left.
+        """Delete the remains of killed writers.
 
         Under another name first: a worker that lives on though its connection is lost must not find its folder half
         emptied and put that among the matches.
@@ -262,7 +282,10 @@ class ParquetStore(Store):
 
 
 def _view(table: Table, matches: Path | None) -> str:
-    """The statement that defines a table over the folders of all matches; without rows where there are none yet."""
+    """Return the statement that defines a table over the folders of all matches.
+
+    It has no rows where there are no matches yet.
+    """
     if table.rows:
         return schema.create_fixed(table)
     if matches is None:
@@ -282,12 +305,12 @@ def _quoted(text: str) -> str:
 def _batches(reader: pa.RecordBatchReader) -> Iterator[pa.RecordBatch]:
     try:
         yield from reader
-    except (pa.ArrowException, OSError) as error:  # what DuckDB finds wrong while it computes rows
+    except (pa.ArrowException, OSError) as error:  # an error while DuckDB computes rows
         raise UsageError(_sql_error(error)) from None
 
 
 def _sql_error(error: Exception) -> str:
-    """DuckDB's text without its drawing of the query."""
+    """Return DuckDB's text without its drawing of the query."""
     return " ".join(str(error).split("\n\nLINE ")[0].split())
 
 
@@ -296,7 +319,7 @@ def _remedy(path: Path) -> str:
 
 
 def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Sources) -> None:
-    """All files of a match, on disk when this returns."""
+    """Write all files of a match; they are on disk when this returns."""
     for name, rows in tables.items():
         packed = {column: ENCODINGS[column] for column in rows.column_names if column in ENCODINGS}
         pq.write_table(
@@ -326,7 +349,7 @@ def _write_match(folder: Path, tables: Tables, *, match_id: str, sources: Source
 
 
 def _sync(path: Path) -> None:
-    """Make what was written to this file, or renamed in this folder, last through a power cut, where the system can."""
+    """Sync a file's content or a folder's entries to disk, to survive a power cut; not on Windows."""
     if sys.platform == "win32":
         return
     handle = os.open(path, os.O_RDONLY)

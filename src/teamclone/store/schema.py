@@ -57,6 +57,7 @@ class Field:
 
     @property
     def sql_type(self) -> str:
+        """The column's type in DuckDB's SQL."""
         return SQL_NAMES[self.dtype]
 
 
@@ -67,7 +68,7 @@ class Table:
     Attributes:
         key: the columns that identify a row.
         rows: given where they are fixed.
-        order: what SQL sorts the rows of a match by, to have them in the order in which a store returns them.
+        order: SQL that sorts the rows of a match into the order in which a store returns them.
     """
 
     name: str
@@ -79,10 +80,11 @@ class Table:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The names of the columns, in their order."""
         return tuple(field.name for field in self.fields)
 
     def select(self, names: Sequence[str] | None) -> tuple[Field, ...]:
-        """The fields of these names, in their order; None for all.
+        """Return the fields of these names, in their order; None for all.
 
         Raises:
             UsageError: a name is no column of this table.
@@ -97,7 +99,7 @@ class Table:
 
 
 def unknown(what: str, name: str, known: tuple[str, ...], *, where: str) -> str:
-    """The text of an error about a name that does not exist, with near matches."""
+    """Return the text of an error about a name that does not exist, with near matches."""
     return f"{where} has no {what} {name!r}; {choose(name, known)}"
 
 
@@ -163,7 +165,7 @@ FRAMES = Table(
 
 PLAYER_STATES = Table(
     name="player_states",
-    about="One row a frame and player, 22 a frame, players who are not on the field included (their state is 0).",
+    about="One row a frame and player, 22 a frame, players off the field included (their state is 0).",
     key=("match_id", "frame", "side", "unum"),
     fields=(
         MATCH_ID,
@@ -182,7 +184,7 @@ COMMANDS = Table(
     fields=(
         MATCH_ID,
         *_logged(columns.COMMANDS),
-        _field("text", "string", "", "what it says besides numbers: the payload of say, `our 9` of attentionto"),
+        _field("text", "string", "", "its text besides numbers: the payload of say, `our 9` of attentionto"),
     ),
     order='line, side, unum, "order"',
 )
@@ -247,7 +249,7 @@ PROBLEMS = Table(
         MATCH_ID,
         _field("code", "string", "", "short name for programs: `truncated`"),
         _field("severity", "string", "", "`note` costs nothing, `warning` some records, `error` the rest of a file"),
-        _field("text", "string", "", "what was expected and what was found"),
+        _field("text", "string", "", "the problem: the expected and the found value"),
         _field("file", "string", "", "file name; NULL where it concerns both files"),
         _field("line", "int32", "", "line of the decompressed file, from 1; NULL where unknown"),
         _field("byte", "int64", "byte", "offset in the decompressed file, from 0; NULL where unknown"),
@@ -277,7 +279,7 @@ COMMAND_KINDS = _names(
 )
 
 MATCH_TABLES = (MATCHES, FRAMES, PLAYER_STATES, COMMANDS, PLAYER_TYPES, PARAMETERS, EVENTS, PROBLEMS)
-"""What every match fills."""
+"""The tables that every match fills."""
 
 TABLES = (*MATCH_TABLES, PLAYMODES, COMMAND_KINDS)
 
@@ -285,7 +287,7 @@ BY_NAME = {table.name: table for table in TABLES}
 
 
 def table(name: str) -> Table:
-    """The table of a name.
+    """Return the table of a name.
 
     Raises:
         UsageError: there is none; near matches are listed.
@@ -296,12 +298,12 @@ def table(name: str) -> Table:
 
 
 def check_format(number: object, version: object, *, where: str, place: str) -> None:
-    """Refuse a store of another format number.
+    """Raise unless a store has our format number.
 
     Args:
         version: the teamclone that wrote it.
         where: the store, for the message.
-        place: what else to ingest into: a folder, a schema.
+        place: the kind of place to ingest into instead: a folder, a schema.
 
     Raises:
         StoreError: the text names the numbers and the remedy.
@@ -319,7 +321,7 @@ def check_format(number: object, version: object, *, where: str, place: str) -> 
 
 
 def arrow_schema(fields: tuple[Field, ...]) -> pa.Schema:
-    """Fields as an Arrow schema, with unit and meaning as metadata, so that a Parquet file explains itself."""
+    """Return fields as an Arrow schema, with unit and meaning as metadata, so that a Parquet file explains itself."""
     import pyarrow as pa
 
     types = {
@@ -342,7 +344,7 @@ def arrow_schema(fields: tuple[Field, ...]) -> pa.Schema:
 
 
 def create_fixed(table: Table) -> str:
-    """The SQL statement that defines a table whose rows are fixed."""
+    """Return the SQL statement that defines a table whose rows are fixed."""
     rows = ", ".join(f"({number}, '{word}')" for number, word in table.rows)
     return f"create view {table.name} as select id::smallint as id, name from (values {rows}) as made(id, name)"
 
@@ -359,7 +361,7 @@ def markdown() -> str:
         "Positions are in metres in the [server's frame](../explanation/frame-of-reference.md): origin at the centre",
         "spot, +x towards the goal that the left team attacks, +y downwards on a monitor, angles in degrees from +x",
         "towards +y. Nothing is mirrored for the right team.",
-        "A value that the log does not hold is NULL wherever the text says NaN; the NumPy readers return NaN.",
+        "A value that the log does not hold is NULL wherever a description has NaN; the NumPy readers return NaN.",
         f"This is format {FORMAT}.",
         "",
         "## On disk",
@@ -368,7 +370,7 @@ def markdown() -> str:
         "STORE/store.json                          format number, version of teamclone",
         "STORE/matches/<match_id>/<table>.parquet  the rows of one match",
         "STORE/matches/<match_id>/meta.json        rows of each table, hashes of the sources, units",
-        "STORE/files/<key>.json                    what became of each source file",
+        "STORE/files/<key>.json                    the status of each source file",
         "STORE/store.duckdb                        views over the Parquet files, for other programs",
         "```",
         "",

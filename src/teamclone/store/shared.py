@@ -27,10 +27,11 @@ class SharedStore:
 
     @classmethod
     def of(cls, store: Store) -> Self:
+        """Describe an open store so that another process can open it."""
         return cls(location=store.location, marker=_marker(store.location))
 
     def open(self) -> Store:
-        """The store, in the process that works on it.
+        """Open the store, in the process that works on it.
 
         Raises:
             StoreError: this machine does not see it.

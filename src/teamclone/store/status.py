@@ -1,4 +1,4 @@
-"""What became of each source file."""
+"""The status of each source file."""
 
 from __future__ import annotations
 
@@ -44,27 +44,34 @@ class FileStatus:
 
     @property
     def key(self) -> str:
+        """The name of this row in a store: `key_of` its path."""
         return key_of(Path(self.path))
 
     def describes(self, path: Path) -> bool:
-        """The file was not changed since, by size and time."""
+        """Return whether the file was not changed since, by size and time."""
         return (self.size, self.mtime_ns) == stamp(path)
 
     def to_json(self) -> dict[str, Any]:
+        """Return the fields by name; `from_json` is the inverse."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
+        """Make a status from the fields that `to_json` returned.
+
+        Raises:
+            ValueError, KeyError, TypeError: the values are not those of a status.
+        """
         return cls(**{**values, "outcome": FileOutcome(values["outcome"])})
 
 
 def key_of(path: Path) -> str:
-    """16 hex digits that name a path, whatever bytes are in it."""
+    """Return 16 hex digits that name a path, whatever bytes are in it."""
     return digest(os.fsencode(path.absolute()))
 
 
 def stamp(path: Path) -> tuple[int, int]:
-    """Size in bytes and time of the last change in ns; (-1, 0) where the file cannot be looked at."""
+    """Return size in bytes and time of the last change in ns; (-1, 0) where the file cannot be read."""
     try:
         found = path.stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""What a store offers, whatever keeps its rows."""
+"""The interface of a store, however it keeps its rows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from teamclone.store.status import FileStatus
 
 
 class Added(StrEnum):
-    """What became of a match that was added."""
+    """The result of adding a match."""
 
     ADDED = "added"
     REPLACED = "replaced"
@@ -41,16 +41,19 @@ class Store(Protocol):
 
     @property
     def location(self) -> str:
-        """What ``open_store`` opens it by, in any process. It may hold a password, which its ``repr`` hides."""
+        """The text that ``open_store`` opens the store by, in any process.
+
+        It may hold a password, which its ``repr`` hides.
+        """
 
     def match_ids(self) -> list[str]:
-        """The matches, sorted."""
+        """Return the ids of the matches, sorted."""
 
     def matches(self) -> pa.Table:
-        """The table ``matches``, by start, file name and id."""
+        """Return the table ``matches``, by start, file name and id."""
 
     def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
-        """The rows of one match in one table, by ``Table.order``; ``columns`` None for all.
+        """Return the rows of one match in one table, by ``Table.order``; ``columns`` None for all.
 
         Raises:
             StoreError: there is no such match, or its rows cannot be read.
@@ -58,7 +61,7 @@ class Store(Protocol):
         """
 
     def read_match_columns(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> Columns:
-        """One match's rows as NumPy columns, typed as in ``Match``: NULL is NaN, text an object array.
+        """Return one match's rows as NumPy columns, typed as in ``Match``: NULL is NaN, text an object array.
 
         ``player_states`` columns have the shape (n_frames, 22), left 1..11 then right 1..11; those of every other table
         (n_rows,). ``columns`` None gives all but ``match_id``. Raises as ``read_table``.
@@ -68,18 +71,18 @@ class Store(Protocol):
         return convert.numpy_columns(wanted, self.read_table(match_id, table, columns=names))
 
     def read_parameters(self, match_id: str) -> dict[str, dict[str, float | str]]:
-        """The parameters of one match: ``{"server": {"ball_decay": 0.94, ...}, "player": {...}}``."""
+        """Return the parameters of one match: ``{"server": {"ball_decay": 0.94, ...}, "player": {...}}``."""
         return convert.parameters(self.read_table(match_id, schema.PARAMETERS.name))
 
     def stream(self, query: str) -> QueryRows:
-        """The answer to a query that only reads.
+        """Return the answer to a query that only reads.
 
         Raises:
             UsageError: the query is wrong, or would change something.
         """
 
     def sql(self, query: str) -> pa.Table:
-        """All of the answer to a query that only reads. Raises as ``stream``."""
+        """Return all of the answer to a query that only reads. Raises as ``stream``."""
         rows = self.stream(query)
         return pa.Table.from_batches(rows.batches, rows.schema)
 
@@ -94,16 +97,16 @@ class Store(Protocol):
         """Forget a match; nothing happens where it is not there."""
 
     def files(self) -> list[FileStatus]:
-        """The status of every source file ever ingested, by path."""
+        """Return the status of every source file ever ingested, by path."""
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
-        """Keep the status of these files, in place of what was known of them."""
+        """Keep the status of these files, in place of an older status."""
 
     def writing(self) -> AbstractContextManager[None]:
-        """Held by an ingest while it writes.
+        """Return a context in which an ingest writes.
 
-        A store in a folder takes one at a time, tidies what a killed one left and, at the end, renews what other
-        programs read; a server takes many.
+        A store in a folder takes one at a time, deletes the remains of a killed one and, at the end, renews the
+        database file for other programs; a server takes many.
 
         Raises:
             StoreError: another ingest holds it.

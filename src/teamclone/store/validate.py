@@ -1,4 +1,4 @@
-"""Is a match what it should be? Logs before they are ingested, and the matches of a store."""
+"""Checks of matches: of logs before they are ingested, and of the matches of a store."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ OnProgress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchCheck:
-    """What was found about one match.
+    """The findings about one match.
 
     Attributes:
         name: its file, or its id in a store.
         error: why nothing could be read, else None.
-        problems: what was odd about its files; of a stored match none, they are in its table ``problems``.
+        problems: problems of its files; none for a stored match, whose are in its table ``problems``.
         findings: the rules that its rows break.
     """
 
@@ -42,7 +42,7 @@ class MatchCheck:
 
     @property
     def wrong(self) -> list[str]:
-        """All that speaks against it; notes do not."""
+        """All problems but notes."""
         texts = [] if self.error is None else [self.error]
         texts += [str(problem) for problem in self.problems if problem.severity is not Severity.NOTE]
         return texts + [str(finding) for finding in self.findings]
@@ -70,7 +70,7 @@ def validate_store(
 def _in_order(
     function: Callable[[T], MatchCheck], tasks: Sequence[T], *, jobs: int | None, on_progress: OnProgress | None
 ) -> Iterator[MatchCheck]:
-    """The checks of all tasks, in their order."""
+    """Yield the checks of all tasks, in their order."""
     for done, (task, outcome) in enumerate(run_tasks(function, tasks, jobs=jobs, in_order=True), 1):
         if on_progress is not None:
             on_progress(done, len(tasks))

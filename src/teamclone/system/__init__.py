@@ -1,1 +1,1 @@
-"""What the rest stands on: files, settings, processes, the machine. Knows nothing of football."""
+"""Files, settings, processes and the machine: used by the rest, knows nothing of football."""

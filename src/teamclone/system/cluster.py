@@ -26,15 +26,15 @@ CLOSE_SECONDS = 2
 
 @contextmanager
 def executor_of(scheduler: str | None, *, jobs: int | None = None) -> Iterator[Executor | None]:
-    """The executor of the cluster at this address; None where no address is given, for processes on this machine.
+    """Open an executor of the cluster at this address; None without an address, for processes on this machine.
 
     Args:
         scheduler: ``tcp://host:port``.
-        jobs: what the user asked for; a cluster has as many processes as it has.
+        jobs: the user's number of processes, which must be None: a cluster has its own.
 
     Raises:
-        UsageError: the address is none, or a number of processes was asked of a cluster.
-        ClusterError: nobody answers, or there are no workers, or they run another version of teamclone.
+        UsageError: the address is no address, or ``jobs`` is given for a cluster.
+        ClusterError: no scheduler answers, or there are no workers, or they run another version of teamclone.
     """
     if scheduler is None:
         yield None
@@ -45,7 +45,7 @@ def executor_of(scheduler: str | None, *, jobs: int | None = None) -> Iterator[E
         raise UsageError(f"--scheduler {scheduler!r}: expected the address of a Dask scheduler, tcp://host:port")
     from distributed import Client
 
-    # What it logs about lost connections we say in a line.
+    # A lost connection becomes one line of ours instead of Dask's log.
     for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
@@ -63,7 +63,7 @@ def executor_of(scheduler: str | None, *, jobs: int | None = None) -> Iterator[E
 
 
 class _Cluster(Executor):
-    """As ``Client.get_executor``, which never answers for a result that was on its way when the scheduler went."""
+    """A replacement of ``Client.get_executor``: its futures never end if the scheduler goes while they wait."""
 
     def __init__(self, client: Client) -> None:
         self._client = client

@@ -1,4 +1,4 @@
-"""Numba kernels: who waits for one to be compiled is told."""
+"""Numba kernels: a log message before each compilation."""
 
 from __future__ import annotations
 

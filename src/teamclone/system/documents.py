@@ -56,12 +56,13 @@ def read_document(
     """Read a document of an expected format.
 
     Args:
-        what: what it is or describes, with its article: ``a run``.
+        path: the document.
+        what: the thing that it is or describes, with its article: ``a run``.
         number: the format that the caller reads.
-        command: what makes such a document: ``teamclone train``.
-        error: the class of what is raised.
+        command: the command that makes such a document: ``teamclone train``.
+        error: the class of the error.
         folder: the folder that the document describes, which the messages then name; None for a document of its own.
-        again: what to do about another format; None for giving ``command`` again.
+        again: the remedy for another format; None for giving ``command`` again.
 
     Raises:
         error: the document is missing, is none, or has another format number.
@@ -82,7 +83,7 @@ def read_document(
 
 
 def not_a_document(path: Path, what: str, problem: Exception) -> str:
-    """Say that a file is not what it should be: ``run/environment.json: not the description of a run (...)``."""
+    """Return an error text: ``run/environment.json: not the description of a run (...)``."""
     return f"{path}: not {what} ({problem!r})"
 
 
@@ -96,15 +97,15 @@ def check_format(
     error: type[TeamcloneError],
     writer: object = None,
 ) -> None:
-    """Refuse another format number.
+    """Raise unless a document has our format number.
 
     Args:
         found: the format number that was read.
         number: the one that this version reads.
         what: the kind of the document, without an article.
         where: its place.
-        again: what to do.
-        error: the class of what is raised.
+        again: the remedy.
+        error: the class of the error.
         writer: the version of teamclone that wrote it; None where that is not known.
 
     Raises:
@@ -128,9 +129,9 @@ def write_errors(
 
     Args:
         where: the folder that is written to.
-        error: the class of what is raised.
-        full: what to do when the disk is full.
-        denied: what to do when it cannot be written for another reason.
+        error: the class of the error.
+        full: the remedy when the disk is full.
+        denied: the remedy when it cannot be written for another reason.
         kinds: the exceptions that are turned.
     """
     try:

@@ -13,7 +13,7 @@ from pathlib import Path
 def write_atomic(path: Path, data: bytes) -> None:
     """Write a file so that a reader, also after a crash, sees the old one or the new one.
 
-    One process at a time may write a path; what a killed one left is overwritten by the next.
+    One process at a time may write a path; the remains of a killed one are overwritten by the next.
     """
     temporary = path.with_name(f".{path.name}.part")
     try:
@@ -27,7 +27,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 def digest(data: bytes) -> str:
-    """16 hex digits that stand for the content."""
+    """Return 16 hex digits that stand for the content."""
     return hashlib.blake2b(data, digest_size=8).hexdigest()
 
 
@@ -43,7 +43,7 @@ def held(path: Path, *, busy: Exception | None = None) -> Iterator[None]:
         return
     import fcntl
 
-    # Over NFS only what may be written can be locked.
+    # Over NFS only a file that may be written can be locked.
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         try:

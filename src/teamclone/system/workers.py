@@ -35,7 +35,7 @@ DIED: Final = Died()
 
 
 def available_cpus() -> int:
-    """The processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -51,10 +51,11 @@ def run_tasks(
     in_order: bool = False,
     on_stop: Callable[[], None] = lambda: None,
 ) -> Iterator[tuple[T, R | Died]]:
-    """Each task with its result.
+    """Yield each task with its result.
 
     Args:
         function: runs in another process, so it and the tasks must pickle. What it raises is raised here.
+        tasks: the arguments of ``function``, one for each call.
         executor: where the tasks run, for example on a Dask cluster. None starts processes on this machine.
         jobs: how many processes to start; None for one a processor. With one job, or one task, all runs in this
             process.
@@ -117,7 +118,7 @@ def _run(
 
 
 def _deaths() -> tuple[type[Exception], ...]:
-    """What executors raise for a task whose process died each time it was tried."""
+    """Return the errors that executors raise for a task whose process died each time it was tried."""
     distributed = sys.modules.get("distributed")
     return (BrokenExecutor,) if distributed is None else (BrokenExecutor, distributed.KilledWorker)
 
@@ -131,6 +132,7 @@ class Processes(Executor):
         self._pools: list[ProcessPoolExecutor] = []
 
     def submit(self, function: Callable[..., R], /, *args: Any, **options: Any) -> Future[R]:
+        """Run a call in a process; the future raises `BrokenExecutor` if two processes died of it."""
         return self._threads.submit(self._call, function, *args, **options)
 
     def _call(self, function: Callable[..., R], *args: Any, **options: Any) -> R:
@@ -145,7 +147,7 @@ class Processes(Executor):
             raise
 
     def _pool(self) -> ProcessPoolExecutor:
-        """The one process of this thread."""
+        """Return the one process of this thread."""
         pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
         if pool is None:
             # Spawned, not forked: threads of Arrow and DuckDB do not survive a fork.
@@ -155,6 +157,7 @@ class Processes(Executor):
         return pool
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes; ``wait`` and ``cancel_futures`` as in `concurrent.futures.Executor.shutdown`."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         for pool in self._pools:
             pool.shutdown(wait)

@@ -14,7 +14,7 @@ from teamclone.training.group import ALONE, Group
 COLDEST, HOTTEST = 0.01, 100.0
 """Bounds of the temperature, for a model that is right or wrong about everything."""
 STEPS = 30
-"""Halvings of what lies between them, which leave a part in a hundred million."""
+"""Halvings of the interval between the bounds, which leave a hundred millionth of it."""
 
 
 class Calibration:
@@ -25,12 +25,12 @@ class Calibration:
         self.kinds = [torch.empty(0, dtype=torch.int64, device=device)]
 
     def add(self, logits: Tensor, kind: Tensor) -> None:
-        """One batch: (batch, commands) as they are trained and (batch,) index into the commands."""
+        """Count one batch: (batch, commands) raw logits and (batch,) index into the commands."""
         self.logits.append(logits.detach().double())
         self.kinds.append(kind)
 
     def fit(self, group: Group = ALONE) -> tuple[float, float]:
-        """The temperature with the least cross-entropy over the samples of all processes.
+        """Return the temperature with the least cross-entropy over the samples of all processes.
 
         The cross-entropy is convex in the inverse of it, so the only minimum is where the slope changes its sign.
 

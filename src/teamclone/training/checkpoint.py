@@ -16,13 +16,13 @@ from teamclone.training.optimiser import Optimiser
 
 
 def save_weights(path: Path, model: nn.Module, *, epoch: int) -> None:
-    """Weights and normalisation of a model, as safetensors; ``epoch`` counts the finished ones."""
+    """Write weights and normalisation of a model as safetensors; ``epoch`` counts the finished ones."""
     tensors = {name: tensor.contiguous().cpu() for name, tensor in model.state_dict().items()}
     write_atomic(path, safetensors.torch.save(tensors, metadata={"epoch": str(epoch)}))
 
 
 def load_weights(path: Path, model: nn.Module) -> int:
-    """Put weights into a model of the same shape; gives the epoch they are of.
+    """Put weights into a model of equal shape; return their epoch.
 
     Raises:
         RunError: the file is damaged or of another model.
@@ -33,7 +33,7 @@ def load_weights(path: Path, model: nn.Module) -> int:
 
 
 def save_progress(path: Path, model: nn.Module, optimiser: Optimiser, *, epoch: int) -> None:
-    """All that the next epoch depends on beside config and dataset."""
+    """Write all that the next epoch depends on beside config and dataset."""
     tensors = {f"model.{name}": tensor.contiguous().cpu() for name, tensor in model.state_dict().items()}
     for index, state in optimiser.state_dict()["state"].items():
         tensors |= {f"optimiser.{index}.{name}": value.contiguous().cpu() for name, value in state.items()}
@@ -41,7 +41,7 @@ def save_progress(path: Path, model: nn.Module, optimiser: Optimiser, *, epoch: 
 
 
 def load_progress(path: Path, model: nn.Module, optimiser: Optimiser) -> int:
-    """Bring model and optimiser to where `save_progress` left them; gives the number of finished epochs."""
+    """Bring model and optimiser to the state of `save_progress`; return the number of finished epochs."""
     tensors, epoch = _read(path)
     weights: dict[str, torch.Tensor] = {}
     states: dict[int, dict[str, Any]] = {}
@@ -72,4 +72,4 @@ def _put(path: Path, model: nn.Module, tensors: dict[str, torch.Tensor]) -> None
     try:
         model.load_state_dict(tensors)
     except RuntimeError as error:
-        raise RunError(f"{path}: of another model than config.toml says ({' '.join(str(error).split())})") from None
+        raise RunError(f"{path}: of another model than that of config.toml ({' '.join(str(error).split())})") from None

@@ -32,14 +32,16 @@ _MAX_X, _MAX_Y, _BODY_LIMIT = (np.float32(limit) for limit in (pitch.MAX_X, pitc
 _NAN = np.float32(math.nan)
 
 _FAR, _NEAR = 16, 4
-"""How many samples ahead a sample's own entries and those of its frame are asked for. A random frame lies in no cache:
-waiting for it takes three times as long as all arithmetic."""
+"""How many samples ahead a sample's own entries and those of its frame are prefetched.
+
+A random frame lies in no cache, and waiting for it takes three times as long as all arithmetic.
+"""
 _DETAIL_LINES, _POSITION_LINES, _CODE_LINES = 7, 3, 2
 """Cache lines of 64 bytes of a frame's ``measured``, ``position`` and ``categorical``."""
 
 
 class Gather:
-    """`PaperFeatures` of samples, on the processor; its normalisation is as it was when this was made."""
+    """`PaperFeatures` of samples, on the processor, with the normalisation at the time of construction."""
 
     def __init__(self, dataset: Dataset, features: PaperFeatures) -> None:
         frames, samples, kinds = dataset.frames, dataset.samples, dataset.player_types.numpy()
@@ -59,7 +61,7 @@ class Gather:
         )
 
     def __call__(self, rows: NDArray[np.int64]) -> Tensor:
-        """(len(rows), columns) float32, normalised.
+        """Return (len(rows), columns) float32, normalised.
 
         Raises:
             DatasetError: an index in the arrays points at nothing.
@@ -74,7 +76,7 @@ class Gather:
 
 
 def _type_parameters(parameters: TypeParameters | None) -> tuple[NDArray[Any], ...]:
-    """Field, middle and half range of the type parameters that are among the inputs."""
+    """Return field, middle and half range of the type parameters that are among the inputs."""
     if parameters is None:
         return np.empty(0, np.int64), np.empty(0, np.float32), np.empty(0, np.float32)
     middle, half_range = (part.cpu().numpy()[:, 0] for part in (parameters.middle, parameters.half_range))
@@ -82,7 +84,7 @@ def _type_parameters(parameters: TypeParameters | None) -> tuple[NDArray[Any], .
 
 
 def _prefetch_code(typing_context: Any, array: Any, index: Any) -> Any:
-    """Ask for the cache line of the array's element ``index``, counted flat; nothing waits for it and nothing fails."""
+    """Prefetch the cache line of the array's element ``index``, counted flat; it neither waits nor fails."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         element = builder.gep(context.make_array(array)(context, builder, arguments[0]).data, [arguments[1]])
@@ -124,7 +126,7 @@ def _gather(
     mean: NDArray[np.float32],
     std: NDArray[np.float32],
 ) -> int:
-    """Fill ``out``, (len(rows), columns); gives how many rows come before the first that points at nothing."""
+    """Fill ``out``, (len(rows), columns); return the number of rows before the first that points at nothing."""
     n_samples, n_frames = len(sample_frame), len(frame_match)
     place = np.empty(22, np.int64)
     value, bound = np.empty_like(mean), np.ones_like(mean)

@@ -32,7 +32,7 @@ class Group:
     size: int = 1
 
     def first(self, work: Callable[[], T]) -> T:
-        """What rank 0 makes of ``work``, which only it does; the others wait. An error is raised in all of them."""
+        """Return the result of ``work``, which only rank 0 does; the others wait. An error is raised in all of them."""
         if self.size == 1:
             return work()
         answer: list[T | TeamcloneError | None] = [None]
@@ -47,13 +47,13 @@ class Group:
         return answer[0]  # type: ignore[return-value]
 
     def add_up(self, *tensors: Tensor) -> None:
-        """Put the sum over all processes in the place of each tensor."""
+        """Replace each tensor by its sum over all processes."""
         if self.size > 1:
             for tensor in tensors:
                 distributed.all_reduce(tensor)
 
     def add_up_gradients(self, model: nn.Module) -> None:
-        """The same for the gradients of a model, in one message."""
+        """Replace the gradients of a model by their sums over all processes, in one message."""
         if self.size > 1:
             gradients = [weights.grad for weights in model.parameters() if weights.grad is not None]
             flat = torch.cat([gradient.reshape(-1) for gradient in gradients])
@@ -72,18 +72,18 @@ ALONE = Group()
 
 
 def is_first() -> bool:
-    """Whether this process is the one that writes and speaks."""
+    """Return whether this process is the one that writes and prints."""
     return not distributed.is_torchelastic_launched() or os.environ["RANK"] == "0"
 
 
 def local_rank() -> int:
-    """Place of this process among those on its machine: the GPU that is its own."""
+    """Return the rank of this process among those on its machine, which is the number of its GPU."""
     return int(os.environ["LOCAL_RANK"]) if distributed.is_torchelastic_launched() else 0
 
 
 @contextmanager
 def joined(device: torch.device) -> Iterator[Group]:
-    """The processes that ``torchrun`` started with this one, connected; this one alone without it."""
+    """Open the group of processes that ``torchrun`` started with this one; without it, of this one alone."""
     if not distributed.is_torchelastic_launched() or os.environ["WORLD_SIZE"] == "1":
         yield ALONE
         return

@@ -1,4 +1,4 @@
-"""What the epochs of a run leave in its folder."""
+"""The files that each epoch writes into a run's folder."""
 
 from __future__ import annotations
 

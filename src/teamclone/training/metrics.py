@@ -1,4 +1,4 @@
-"""What a network gets right, counted over batches: the figures of `metrics.jsonl`."""
+"""Running figures of a network, counted over batches, for `metrics.jsonl`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RunningMetrics:
         self.confusion.index_add_(0, cells, torch.ones_like(cells))
 
     def table(self, group: Group = ALONE) -> dict[str, float]:
-        """The figures over all processes; those of commands that never occurred are missing.
+        """Return the figures over all processes; those of commands that never occurred are missing.
 
         ``loss``, ``cross_entropy``, ``parameter_loss``: means per sample, of the training error and its parts.
         ``accuracy``, ``recall_<command>``.
@@ -66,7 +66,7 @@ class RunningMetrics:
 
 
 def _recalls(confusion: Tensor, commands: Sequence[str]) -> dict[str, float]:
-    """``recall_<command>`` from counts (true, predicted)."""
+    """Return ``recall_<command>`` from counts (true, predicted)."""
     return {
         f"recall_{name}": int(row[index]) / int(row.sum())
         for index, (name, row) in enumerate(zip(commands, confusion, strict=True))

@@ -1,4 +1,4 @@
-"""What moves the weights along their gradients."""
+"""Optimisers: Adam and others of PyTorch, Muon for matrices."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NEWTON_SCHULZ = 3.4445, -4.7750, 2.0315
 class Orthogonal(torch.optim.Optimizer):
     """Muon (Jordan 2024): each step of a matrix is made orthogonal.
 
-    So it goes as far in directions that few samples pull as in those that all do. Steps are scaled to the size of
+    So it goes equally far in directions of few and of many samples. Steps are scaled to the size of
     Adam's (Liu et al. 2025, "Muon is scalable for LLM training"), so that one learning rate serves both. PyTorch's own
     always computes in bfloat16, which is far slower on a processor without it.
 
@@ -33,6 +33,7 @@ class Orthogonal(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: None = None) -> None:  # type: ignore[override]
+        """Move the matrices one step; ``closure`` is ignored."""
         for group in self.param_groups:
             for weights in group["params"]:
                 if weights.grad is None:
@@ -47,7 +48,10 @@ class Orthogonal(torch.optim.Optimizer):
 
 
 def orthogonal(matrix: Tensor, dtype: torch.dtype) -> Tensor:
-    """About U V' of the singular value decomposition U S V' of a matrix, by five steps of Newton and Schulz."""
+    """Return about U V' of the singular value decomposition U S V' of a matrix.
+
+    Five steps of Newton and Schulz, see NEWTON_SCHULZ.
+    """
     wide = matrix.shape[0] <= matrix.shape[1]
     of = matrix if wide else matrix.T
     of = (of / of.norm().clamp(min=1e-7)).to(dtype)
@@ -72,18 +76,21 @@ class Muon:
 
     @property
     def param_groups(self) -> list[dict[str, Any]]:
+        """The parameter groups of both optimisers, matrices first."""
         return [group for part in self.parts for group in part.param_groups]
 
     def zero_grad(self, *, set_to_none: bool = True) -> None:
+        """Clear the gradients of all weights."""
         for part in self.parts:
             part.zero_grad(set_to_none=set_to_none)
 
     def step(self) -> None:
+        """Move all weights one step."""
         for part in self.parts:
             part.step()
 
     def state_dict(self) -> dict[str, Any]:
-        """As of an optimiser of PyTorch: the matrices are counted first."""
+        """Return the state in the layout of a PyTorch optimiser, matrices first."""
         matrices, adam = (part.state_dict()["state"] for part in self.parts)
         return {
             "state": matrices | {self._first_of_adam + index: state for index, state in adam.items()},
@@ -91,6 +98,7 @@ class Muon:
         }
 
     def load_state_dict(self, saved: dict[str, Any]) -> None:
+        """Restore a state that `state_dict` returned."""
         first = self._first_of_adam
         states = (
             {index: state for index, state in saved["state"].items() if index < first},
@@ -108,7 +116,7 @@ Optimiser = torch.optim.Optimizer | Muon
 
 
 def optimiser_of(config: TrainConfig, model: nn.Module, *, precision: Literal["fp32", "bf16"] = "fp32") -> Optimiser:
-    """The optimiser that a config asks for, of all weights of a model."""
+    """Return the optimiser that a config asks for, of all weights of a model."""
     if config.optimiser == "muon":
         return Muon(config, model, dtype=torch.bfloat16 if precision == "bf16" else torch.float32)
     if config.optimiser == "adam":

@@ -1,1 +1,1 @@
-"""What one cycle looks like to a team."""
+"""One cycle as a team sees it."""

@@ -1,4 +1,4 @@
-"""What is known of each player in a cycle: the channels of a `World`, each with its unit, and the bits of ``flags``."""
+"""The channels of a `World`: a player's values in a cycle, each with its unit, and the bits of ``flags``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MEASURED = (
     Channel(name="recovery", unit="", about="stamina recovery rate"),
     Channel(name="capacity", unit="stamina", about="stamina left to recover"),
 )
-"""What is measured of each player beside the position; NaN where the log lacks it."""
+"""Measured channels of a player beside the position; NaN where the log lacks them."""
 CATEGORICAL = (
     Channel(name="type", unit="", about="heterogeneous player type"),
     Channel(name="flags", unit="", about="bit mask of FLAG_*"),
@@ -41,7 +41,7 @@ CATEGORICAL = (
         about="command kind id that the server executed between the previous frame and this one; 0 none",
     ),
 )
-"""What is counted or named of each player; NaN where the log lacks it."""
+"""Counts and codes of a player; NaN where the log lacks them."""
 
 FLAG_ON_FIELD = 1
 FLAG_GOALIE = 2

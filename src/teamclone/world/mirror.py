@@ -1,4 +1,4 @@
-"""The game reflected at the long axis: what is left becomes right, and players change places with their counterparts.
+"""The game reflected at the long axis: left becomes right, and players change places with their counterparts.
 
 The simulator does not know left from right, so the mirrored command is right in the mirrored situation, if the team
 plays the same on both sides. A player's role goes with the number, hence the left back becomes the right back.
@@ -25,7 +25,7 @@ _CHANNELS[[CHANNEL[name] for name in ("y", "vy", "body", "neck")]] = -1.0
 
 @cache
 def _arguments(commands: tuple[str, ...]) -> Tensor:
-    """(commands, 2) -1 for arguments that change their sign."""
+    """Return (commands, 2), -1 for arguments that change their sign."""
     signs = torch.ones(len(commands), 2)
     for item in parameters_of(commands):
         if item.sided:
@@ -37,7 +37,8 @@ def mirror_state(state: State, places: Tensor) -> State:
     """Return the situations reflected: y, vy, body and neck negated, now and before; players in exchanged places.
 
     Args:
-        places: (22,) int64, each player's counterpart, as `mirror_places` gives them.
+        state: the situations.
+        places: (22,) int64, each player's counterpart, see `mirror_places`.
     """
     ball, channels = _BALL.to(state.ball), _CHANNELS.to(state.players)
     return state._replace(
@@ -51,7 +52,7 @@ def mirror_state(state: State, places: Tensor) -> State:
 
 
 def mirror_target(target: Target, commands: tuple[str, ...] = CLONED) -> Target:
-    """The commands reflected: turn moments, directions and the y of places negated."""
+    """Return the commands reflected: turn moments, directions and the y of places negated."""
     return Target(target.kind, target.parameters * _arguments(commands).to(target.parameters)[target.kind])
 
 
@@ -63,12 +64,11 @@ def mirror_places(mean: NDArray[np.floating]) -> Tensor:
     mean different roles, and no input but the paper's knows an opponent by number.
 
     Args:
-        mean: (22, 2) metres, each player's mean position; NaN for a player who never played, whose counterpart is
-            itself.
+        mean: (22, 2) metres, each player's mean position; NaN for a player that never played, its own counterpart.
     """
     from scipy.optimize import linear_sum_assignment
 
-    # Far away, a player who never played costs nothing as its own counterpart and much as another's.
+    # Far away, a player that never played costs nothing as its own counterpart and much as another's.
     team = np.where(np.isfinite(mean[:N_TEAM]), mean[:N_TEAM], (1e4, 0.0))
     cost = np.square(team[:, None] - team[None] * (1.0, -1.0)).sum(-1)
     # The costs are symmetric, so that the best matching is its own inverse, unless several are equally good.

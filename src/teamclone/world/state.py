@@ -15,7 +15,7 @@ from teamclone.world.world import World
 
 
 class State(NamedTuple):
-    """Frames as a team sees them, and for each sample of a batch its frame and the player who acts.
+    """Frames as a team sees them, and for each sample of a batch its frame and the actor.
 
     Eleven players of a cycle share one frame. Units and order of players are those of `World`.
 
@@ -30,7 +30,7 @@ class State(NamedTuple):
         mode: (frames,) int64, the PlayMode as if the modelled team were the left one: KICK_IN_L is its own kick-in.
         mode_cycles: (frames,) frames since this mode began, 0 in its first.
         frame: (batch,) int64, index into the frames.
-        actor: (batch,) int64, index 0..10 of the player who acts.
+        actor: (batch,) int64, index 0..10 of the player whose command is asked for.
     """
 
     ball: Tensor
@@ -110,7 +110,7 @@ class State(NamedTuple):
         return self._replace(frame=self.frame[rows], actor=self.actor[rows])
 
     def each(self) -> State:
-        """Return the same samples with a frame of its own for each."""
+        """Return the samples with a frame of its own for each."""
         frames = [part.index_select(0, self.frame) for part in self[: self._fields.index("frame")]]
         return State._make([*frames, torch.arange(self.frame.shape[0], device=self.frame.device), self.actor])
 
@@ -120,8 +120,12 @@ class State(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What the players did: kind (batch,) int64 index into the dataset's commands; parameters (batch, 2) in power,
-    degrees and metres."""
+    """The commands of the actors.
+
+    Attributes:
+        kind: (batch,) int64 index into the dataset's commands.
+        parameters: (batch, 2) power, degrees and metres.
+    """
 
     kind: Tensor
     parameters: Tensor

@@ -40,7 +40,7 @@ PLAYER_COLUMNS = (
     *(channel.name for channel in MEASURED),
     *(counter_name(kind) for kind in BODY_KINDS),
 )
-"""What a view needs of a match's tables."""
+"""Columns of a match's tables that a view needs."""
 
 _FLAGS = (
     (FLAG_ON_FIELD, state_bits.STAND),
@@ -112,7 +112,7 @@ def view_columns(
 
 
 def _since(frames: Columns) -> NDArray[np.int32]:
-    """(n_frames,) frames since the play mode began, 0 in its first, and in the first after lost frames."""
+    """Return (n_frames,) frames since the play mode began, 0 in its first, and in the first after lost frames."""
     mode: NDArray[Any] = frames["playmode"]
     began = np.ones(len(mode), np.bool_)
     began[1:] = (mode[1:] != mode[:-1]) | ~follows(frames)[:-1]

@@ -44,11 +44,11 @@ class World:
         return len(self.cycle)
 
     def channel(self, name: str) -> NDArray[np.float32]:
-        """(n_frames, 22) one of PLAYER_CHANNELS."""
+        """Return (n_frames, 22) one of PLAYER_CHANNELS."""
         return self.players[..., CHANNEL[name]]
 
     def select(self, frames: NDArray[Any]) -> World:
-        """Some of the frames: indices or a mask."""
+        """Return some of the frames: indices or a mask."""
         return replace(
             self,
             **{
@@ -58,7 +58,7 @@ class World:
         )
 
     def types_of(self, frames: NDArray[np.int64]) -> NDArray[np.float32]:
-        """(n, 22, len(player_types.FIELDS)) physical parameters of every player in some frames.
+        """Return (n, 22, len(player_types.FIELDS)) physical parameters of every player in some frames.
 
         Raises:
             IndexError: a player has a type that the log does not describe.
@@ -66,7 +66,7 @@ class World:
         return self.types[self.channel("type")[frames].astype(np.int64)]
 
     def past(self, frames: NDArray[np.int64], history: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Frames one, two, ... cycles before some frames.
+        """Return the frames one, two, ... cycles before some frames.
 
         Returns:
             (n, history) their indices, and whether there is such a frame: not before the clock stood, nor where frames

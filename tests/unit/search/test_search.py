@@ -127,7 +127,7 @@ def test_of_equally_good_architectures_the_beam_takes_the_smaller() -> None:
         ({"smallest": 512, "largest": 64}, "smallest, 512, is above largest, 64"),
         ({"start": ((256, 100),)}, "start 256-100: expected powers of two from 32 to 1024"),
         ({"start": ((2048,),)}, "start 2048: expected powers of two from 32 to 1024"),
-        ({"held": ("model.hidden",)}, "chooses model.hidden; say where it starts with --start"),
+        ({"held": ("model.hidden",)}, "chooses model.hidden; set its first architectures with --start"),
     ],
 )
 def test_wrong_options_of_a_beam_search(options: dict[str, Any], text: str) -> None:

@@ -1,7 +1,7 @@
 """Kicks: the velocity that the ball is to have, from which physics gives power and direction.
 
-A kick adds to the velocity that the ball already has, seen from a body that may face anywhere. What a player wants is
-simpler: the ball with a team mate, in the goal, or so far ahead that he has it again after a few dashes.
+A kick adds to the velocity that the ball already has, seen from a body that may face anywhere. The purpose of a kick is
+simpler: the ball goes to a team mate, into the goal, or so far ahead that the player reaches it again in a few dashes.
 """
 
 from __future__ import annotations
@@ -20,22 +20,24 @@ from teamclone.rcss import pitch
 BALL_COMPONENTS = 3
 """Components that begin at the ball itself."""
 DRIBBLES = (1, 2, 3, 4, 5, 7, 10)
-"""Cycles after which a dribbler wants the ball before him."""
+"""Cycles after which a dribbler reaches the ball again."""
 LEAD_M = 12.0
-"""How far from a team mate, the goal's middle or the ball what is aimed at may lie, for an output of 1."""
+"""Metres from a team mate, the goal's middle or the ball to the target, for an output of 1."""
 TOUCH_M = 3.0
-"""The same of a dribble, from where he then is."""
+"""Metres from the dribbler's later place to the target of a dribble, for an output of 1."""
 AHEAD_M = 0.6
-"""Where a dribbler likes to have the ball."""
+"""Metres in front of a dribbler at which the ball is to be."""
 N_COMPONENTS = MATES + 1 + BALL_COMPONENTS + len(DRIBBLES)
 USUAL_ERROR = 0.003
-"""Metres per cycle by which the velocity of the ball misses what was planned, before training."""
+"""Metres per cycle between the planned and the real velocity of the ball, before training."""
 IMPOSSIBLE = -30.0
-"""Logit of a way that there is not."""
+"""Logit of a way that the plan does not have."""
 
 
 def kick_for(wanted: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
-    """Power, at most 150, and direction, radians from the body, of kicks after which the ball has a velocity.
+    """Return power and direction of the kicks that give the ball a velocity.
+
+    Power is at most 150; directions are radians from the body.
 
     Args:
         wanted: (batch, components, 2) metres per cycle on the pitch.
@@ -50,7 +52,7 @@ class Planned(nn.Module):
     """Components of power and direction of a kick, one for each way that a plan knows (`planner.plan`).
 
     Attributes:
-        error: (WAYS,) logarithm of the velocities by which kicks miss what was planned, in USUAL_ERROR.
+        error: (WAYS,) logarithm of the errors of the ball's velocity after planned kicks, in USUAL_ERROR.
     """
 
     def __init__(self, width: int) -> None:
@@ -59,7 +61,7 @@ class Planned(nn.Module):
         self.error = nn.Parameter(torch.zeros(len(WAYS)))
 
     def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
-        """As of `Kicks`."""
+        """Return mixtures of power and direction, see `Kicks.forward`."""
         share = self.share(hidden).float()
         with torch.autocast(hidden.device.type, enabled=False):
             ways = ways_of(geometry)
@@ -79,8 +81,8 @@ class Kicks(nn.Module):
     There are N_COMPONENTS, and with ``planned`` those of `Planned`.
 
     Args:
-        width: of what a kick is decided on.
-        target_width: of what is known of each of `crowd.TARGETS`, the team mates and the goal; 0 for nothing.
+        width: of the features of kicks.
+        target_width: of the embedding of each of `players.TARGETS`, the team mates and the goal; 0 for none.
         planned: add those of `Planned`; the geometry ends in WAY then.
     """
 
@@ -96,7 +98,7 @@ class Kicks(nn.Module):
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
     def forward(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None = None) -> tuple[Mixture, Mixture]:
-        """Power and direction (radians from the body).
+        """Return mixtures of power and direction (radians from the body).
 
         Args:
             hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
@@ -109,7 +111,7 @@ class Kicks(nn.Module):
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:
-        """Those that the network moves about."""
+        """Return the components whose targets the network chooses."""
         raw = self.layer(hidden).float().view(-1, 6, N_COMPONENTS)
         if self.target is not None and targets is not None:
             # The components begin with the team mates and the goal.
@@ -131,7 +133,7 @@ class Kicks(nn.Module):
             )
 
     def _aimed(self, ahead: Tensor, aside: Tensor, speed: Tensor, geometry: Tensor) -> Tensor:
-        """(batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""
+        """Return (batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""
         mates = mates_of(geometry)
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)[:, None]
         base = torch.cat([mates, self.goal.expand_as(ball), ball.expand(-1, BALL_COMPONENTS, -1)], 1)
@@ -140,7 +142,10 @@ class Kicks(nn.Module):
         return direction * (geometry_of(geometry, "ball_speed_max")[0] * torch.sigmoid(speed))[..., None]
 
     def _dribbled(self, ahead: Tensor, aside: Tensor, geometry: Tensor) -> Tensor:
-        """(batch, components, 2) velocities that bring the ball before him after a kick and dashes straight on."""
+        """Return (batch, components, 2) velocities of dribbles.
+
+        Each brings the ball in front of the actor after a kick and dashes straight on.
+        """
         decay, forward, sideways, gain = geometry_of(geometry, "decay", "forward", "aside", "dash_gain")
         coasted = roll(self.cycles, decay)
         run = forward * coasted + covered(self.cycles - 1, 100.0 * gain, decay)

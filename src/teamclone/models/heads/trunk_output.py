@@ -1,4 +1,4 @@
-"""What a trunk hands to its head."""
+"""The output of a trunk, the input of its head."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from torch import Tensor
 
 
 class KickFeatures(NamedTuple):
-    """What kicks and tackles are decided on: first the situations as they are, then their mirror images.
+    """Features for kicks and tackles: first of the situations, then of their mirror images.
 
     Attributes:
         hidden: (2 * kicks, kick width). geometry: (2 * kicks, columns of geometry).
-        targets: (2 * kicks, TARGETS, width) what `PlayerEncoder` knows of each team mate and of the goal; None without
-            an encoder.
+        targets: (2 * kicks, TARGETS, width) embedding by `PlayerEncoder` of each team mate and of the goal; None
+            without an encoder.
     """
 
     hidden: Tensor
@@ -22,7 +22,7 @@ class KickFeatures(NamedTuple):
 
 
 class TrunkOutput(NamedTuple):
-    """What the trunk of the egocentric family makes of a batch of situations.
+    """Output of the egocentric family's trunk for a batch of situations.
 
     Attributes:
         hidden: (batch, width) features of the command.

@@ -1,4 +1,4 @@
-"""What the egocentric blocks share: who is where, who has the ball now, who can have it how soon, and the lines."""
+"""Quantities that egocentric blocks share: positions, control of the ball, times to reach it, and the lines."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.world.state import State
 
 FAR_M = 100.0
-"""Further than anything on the pitch; the place of players who are not there."""
+"""Farther than anything on the pitch; the place of players off the field."""
 DOUBT_SHARE, DOUBT_M = 0.02, 0.5
-"""By how much an actor errs about where an opponent near the ball is: a share of the distances, and the most of it."""
+"""An actor's error about the place of an opponent near the ball: a share of the distances, and its maximum."""
 
 
 class ActorView:
-    """A batch of samples as their actors see them. What one block alone needs is not computed for others.
+    """A batch of samples as their actors see them. Quantities of a single block are computed there.
 
-    Attributes, (batch, ...) unless said otherwise:
+    Attributes, (batch, ...) unless noted otherwise:
         ball: (batch, 4). me: channels of the actor. my_type: fields of the actor's type. server: server fields.
         axes: the actor's. body: radians.
         players: (batch, 22, channels); position, motion: (batch, 22, 2) of them; flags: (batch, 22) int64.
@@ -43,7 +43,7 @@ class ActorView:
     def __init__(self, state: State) -> None:
         self.state, self.actor = state, state.actor
         frame = state.frame
-        # What is the same for all players of a frame is computed once.
+        # Quantities that all players of a frame share are computed once.
         position, motion = state.players[..., _XY], state.players[..., _VXY]
         flags = state.players[..., CHANNEL["flags"]].long()
         on_field = (flags & FLAG_ON_FIELD) != 0
@@ -113,7 +113,7 @@ class ActorView:
 
     @cached_property
     def plans(self) -> Tensor:
-        """Return (batch, len(PLAN)) what is planned with the ball."""
+        """Return (batch, len(PLAN)) the plans with the ball."""
         return plans(self.state)
 
     @cached_property

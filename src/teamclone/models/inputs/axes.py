@@ -29,7 +29,7 @@ class Axes:
         return self.turn(place - self.origin.view(shape))
 
     def polar(self, place: Tensor) -> Tensor:
-        """Return (batch, 5) what `polar` makes of a place on the pitch in these axes."""
+        """Return (batch, 5) columns of a place on the pitch in these axes, see `polar`."""
         return polar(self.see(place))
 
     def angle(self, vector: Tensor) -> Tensor:

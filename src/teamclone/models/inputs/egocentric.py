@@ -1,4 +1,4 @@
-"""Inputs in the axes of the player who acts: places relative to the body, times to the ball, what happened before.
+"""Inputs in the actor's axes: places relative to the body, times to the ball, the frames before.
 
 They come in blocks, each of which can be left out. None but ``role`` knows a player by its uniform number.
 """
@@ -51,7 +51,7 @@ PAST_FRAMES = 3
 NEAREST_OPPONENTS = 6
 RIVALS = 3
 CLIP = 10.0
-"""Standard deviations to which inputs are limited, so that nothing unheard of leads far astray."""
+"""Standard deviations to which inputs are limited, so that unseen values do no great harm."""
 NEAR_M = 1.0
 NEAR_SHARE = 0.1
 """A player takes itself to be in its place within this many metres, or this share of the distance to the ball."""
@@ -61,12 +61,13 @@ _SIDED = Situation.KICK_OFF
 """The first Situation that is one of the two teams', as all after it are."""
 MODES = _SIDED + 2 * (len(Situation) - _SIDED)
 _MODE_COLUMN = np.where(SITUATION < _SIDED, SITUATION, 2 * SITUATION - _SIDED + (RESTARTS < 0)).astype(np.int64)
-"""(256,) which of MODES a play mode is: a Situation that is nobody's, or one and who restarts, the own team first."""
+"""(256,) the MODES column of a play mode: a Situation without a side, or one and the side that restarts, own first."""
 
 
 class EgocentricFeatures(nn.Module):
-    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is; TACKLE and WAY with the
-    block ``plan``.
+    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is.
+
+    With the block ``plan`` TACKLE and WAY follow.
 
     Args:
         blocks: some of BLOCKS; ``scene`` is always among the columns.
@@ -101,16 +102,19 @@ class EgocentricFeatures(nn.Module):
         self.register_buffer("signs", self._signs(), persistent=False)
 
     def _signs(self) -> Tensor:
-        """(len(names),) -1 for columns that change their sign where left and right are exchanged, else 1."""
+        """Return (len(names),) -1 for columns that change their sign where left and right are exchanged, else 1."""
         state = _any(self.history)
         plain, mirrored = self.project(state), self.project(mirror_state(state, torch.arange(N_PLAYERS)))
         turned = (plain + mirrored).abs().amax(0) < (plain - mirrored).abs().amax(0)
-        # Nobody has the ball in these, so that of what is planned there is nothing to be seen.
+        # No player has the ball in these situations, so the columns of plans are zero.
         turned |= torch.tensor([name in SIDED for name in self.names])
         return torch.where(turned, -1.0, 1.0)
 
     def counterparts(self, places: Tensor) -> Tensor:
-        """Return (len(names),) which column holds in the mirror what this one holds: only the role knows numbers."""
+        """Return the column permutation of a left-right reflection, (len(names),); signs are in `signs`.
+
+        Only the block ``role`` depends on ``places``.
+        """
         order = list(range(len(self.names)))
         if "role" in self.blocks:
             first = self.names.index("role_0")
@@ -118,13 +122,13 @@ class EgocentricFeatures(nn.Module):
         return torch.tensor(order)
 
     def columns(self, blocks: tuple[str, ...]) -> list[int]:
-        """Places of the columns of ``scene`` and of some blocks."""
+        """Return the places of the columns of ``scene`` and of some blocks."""
         return [
             i for i, name in enumerate(self.names[: self.n_inputs]) if name.rpartition("_")[0] in ("scene", *blocks)
         ]
 
     def project(self, state: State) -> Tensor:
-        """(batch, len(names)) before normalisation."""
+        """Return (batch, len(names)) inputs before normalisation."""
         view = ActorView(state)
         columns = [_BLOCKS[name](self, view) for name in ("scene", *self.blocks)]
         columns.append(_geometry(view))
@@ -135,22 +139,23 @@ class EgocentricFeatures(nn.Module):
         return torch.cat(columns, dim=1)
 
     def fit(self, chunks: Iterable[Tensor]) -> None:
-        """Fit the normalisation on what `project` makes of the training samples, chunk by chunk."""
+        """Fit the normalisation to projected training samples, chunk by chunk."""
         self.normalisation.fit(chunk[:, : self.n_inputs] for chunk in chunks)
-        # What changes its sign in the mirror must do so after normalisation, too.
+        # Columns that change their sign in the mirror must do so after normalisation, too.
         self.normalisation.mean[self.signs[: self.n_inputs] < 0] = 0.0
 
     def normalise(self, columns: Tensor) -> Tensor:
-        """(batch, len(names)) of what `project` gives; GEOMETRY and what follows stay."""
+        """Return (batch, len(names)) normalised columns of `project`; GEOMETRY and the columns after it stay."""
         inputs, geometry = columns[:, : self.n_inputs], columns[:, self.n_inputs :]
         return torch.cat([self.normalisation(inputs).clamp(-CLIP, CLIP), geometry], dim=1)
 
     def forward(self, state: State) -> Tensor:
+        """Return (batch, len(names)) normalised inputs."""
         return self.normalise(self.project(state))
 
 
 def _scene(features: EgocentricFeatures, view: ActorView) -> Tensor:
-    """Return where things are on the pitch, when the ball is met, and the lines."""
+    """Return positions on the pitch, the time to meet the ball, and the lines."""
     return torch.cat(
         [
             _on_pitch(view.axes.origin),
@@ -203,7 +208,7 @@ def _type(features: EgocentricFeatures, view: ActorView) -> Tensor:
 
 
 def _last(features: EgocentricFeatures, view: ActorView) -> Tensor:
-    """Return what the actor and the others did in the cycle before."""
+    """Return the commands of the actor and the others in the cycle before."""
     return _last_commands(view.players, view.actor)
 
 
@@ -216,7 +221,7 @@ def _last_commands(players: Tensor, actor: Tensor) -> Tensor:
 
 
 def _sight(features: EgocentricFeatures, view: ActorView) -> Tensor:
-    """Return (batch, 3) where the actor looks, relative to the body, and how wide."""
+    """Return (batch, 3) the view direction relative to the body, and the view width."""
     neck = radians(view.me[:, CHANNEL["neck"]])
     return torch.stack([torch.cos(neck), torch.sin(neck), view.me[:, CHANNEL["view_width"]] / 180], 1)
 
@@ -259,7 +264,7 @@ def _ball(features: EgocentricFeatures, view: ActorView) -> Tensor:
 
 
 def _reach(features: EgocentricFeatures, view: ActorView) -> Tensor:
-    """Return who has the ball, who can have it how soon, and where."""
+    """Return the control of the ball, the times in which players can have it, and the places."""
     own, mate, opponent = view.own_steps, view.mates2[:, 0], view.opponents2[:, 0]
     margins = [own - mate, own - opponent, mate - opponent, torch.minimum(own, mate) - opponent]
     has = [view.rank / 5, view.mate_has_it.to(view.ball.dtype), view.held.to(view.ball.dtype)]
@@ -293,7 +298,7 @@ def _lines(features: EgocentricFeatures, view: ActorView) -> Tensor:
 
 
 def _plan(features: EgocentricFeatures, view: ActorView) -> Tensor:
-    """Return what is planned with the ball, zeros for an actor who cannot kick it."""
+    """Return the plans with the ball, zeros for an actor that cannot kick it."""
     column = {name: view.plans[:, index, None] for index, name in enumerate(PLAN)}
     values = torch.cat([column[f"{name}_value"] for name in VALUED], 1)
     seen = [
@@ -392,7 +397,7 @@ _BLOCKS: dict[str, Callable[[EgocentricFeatures, ActorView], Tensor]] = {
     "past": _past,
     "mode": _mode,
 }
-"""What makes the columns of each of `config.BLOCKS`, (batch, columns); only the chosen ones are computed."""
+"""The function of each of `config.BLOCKS` that makes its columns, (batch, columns)."""
 
 
 def _geometry(view: ActorView) -> Tensor:
@@ -458,7 +463,7 @@ def _on_pitch(place: Tensor) -> Tensor:
 
 
 def _nearest(others: Tensor, distance: Tensor, there: Tensor, count: int) -> Tensor:
-    """Return (batch, count * columns) the nearest first; zeros for those who are not there."""
+    """Return (batch, count * columns) the nearest first; zeros for missing players."""
     nearest = torch.where(there, -distance, -math.inf).topk(count, dim=1).indices
     chosen = others.gather(1, nearest[..., None].expand(-1, -1, others.shape[2]))
     return (chosen * there.gather(1, nearest)[..., None]).flatten(1)
@@ -505,7 +510,7 @@ def _any(history: int) -> State:
 
 
 def _blank(history: int) -> State:
-    """Return one situation of zeros: to see how many columns there are."""
+    """Return one situation of zeros, to count the columns."""
     state = State.now(
         ball=torch.zeros(1, 4),
         players=torch.zeros(1, N_PLAYERS, len(CHANNEL)),

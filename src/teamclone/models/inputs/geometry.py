@@ -1,4 +1,4 @@
-"""Plain quantities beside the inputs of a network, which turn places on the pitch and motions into commands.
+"""Plain quantities beside the inputs of a network, for layers that turn places and motions into commands.
 
 Features end in these columns as they are, neither normalised nor limited. Layers read them by name.
 """
@@ -19,7 +19,7 @@ GEOMETRY = (
     "kick_area", "kick_margin", "ball_decay", "ball_speed_max",
     *(f"mate_{mate}_{axis}" for mate in range(MATES) for axis in "xy"),
 )  # fmt: skip
-"""What makes a command of a place on the pitch or of a wanted motion; metres, metres per cycle, radians:
+"""Columns that turn a place on the pitch or a wanted motion into a command; metres, metres per cycle, radians:
 
 x, y: the actor. coast_x, coast_y: where it comes to rest without a dash. cos, sin: of its body direction.
 forward, aside: its velocity along and across the body. turn_factor: turn moment for one degree. decay: of its velocity.

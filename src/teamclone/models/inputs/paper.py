@@ -26,7 +26,7 @@ def logged_ball_speed_max(server: Tensor) -> Tensor:
 
 
 class Features(Protocol):
-    """What a network asks of its inputs. A new set of inputs is one such module and its place in `clone.Clone`."""
+    """The interface of a network's inputs. A new set of inputs is one such module and its place in `clone.Clone`."""
 
     names: tuple[str, ...]
     channels: tuple[str, ...]
@@ -36,11 +36,24 @@ class Features(Protocol):
     signs: Tensor
     """(columns,) -1 for columns that change their sign where left and right are exchanged, else 1."""
 
-    def fit(self, chunks: Iterable[Tensor]) -> None: ...
-    def project(self, state: State) -> Tensor: ...
-    def counterparts(self, places: Tensor) -> Tensor: ...
-    def normalise(self, columns: Tensor) -> Tensor: ...
-    def __call__(self, state: State) -> Tensor: ...
+    def fit(self, chunks: Iterable[Tensor]) -> None:
+        """Fit the normalisation to projected training samples, (n, len(names)) each, chunk by chunk."""
+
+    def project(self, state: State) -> Tensor:
+        """Return (batch, len(names)) inputs before normalisation."""
+
+    def counterparts(self, places: Tensor) -> Tensor:
+        """Return the column permutation of a left-right reflection, (len(names),); signs are in ``signs``.
+
+        Args:
+            places: (22,) each player's counterpart, see `mirror.mirror_places`.
+        """
+
+    def normalise(self, columns: Tensor) -> Tensor:
+        """Return (batch, len(names)) normalised columns of `project`."""
+
+    def __call__(self, state: State) -> Tensor:
+        """Return (batch, len(names)) normalised inputs."""
 
 
 class Normalisation(nn.Module):
@@ -69,13 +82,14 @@ class Normalisation(nn.Module):
         self.std.copy_(torch.where(std > 1e-6, std, 1.0))
 
     def forward(self, values: Tensor) -> Tensor:
+        """Return normalised values, (n, width)."""
         return (values - self.mean) / self.std
 
 
 class PaperFeatures(nn.Module):
-    """Table I: the ball, every player and once more the player who acts; 119 columns.
+    """Table I: the ball, every player and once more the actor; 119 columns.
 
-    Every value is divided by its bound, which projects it onto [-1, 1]: x and y by what the server clips players to,
+    Every value is divided by its bound, which projects it onto [-1, 1]: x and y by the server's bounds of players,
     body by 180 degrees, velocities by their true maximum in a log, speed limit times decay of the ball or of the
     player's own type. Nothing is clipped. Then comes the input normalisation of Table III.
 
@@ -108,7 +122,7 @@ class PaperFeatures(nn.Module):
         self.register_buffer("signs", torch.where(torch.tensor(sided), -1.0, 1.0), persistent=False)
 
     def counterparts(self, places: Tensor) -> Tensor:
-        """(len(names),) which column holds in the mirror, but for its sign, what this one holds.
+        """Return the column permutation of a left-right reflection, (len(names),); signs are in `signs`.
 
         Args:
             places: (22,) each player's counterpart, see `mirror.mirror_places`.
@@ -145,20 +159,21 @@ class PaperFeatures(nn.Module):
         return torch.cat(parts, dim=1)
 
     def fit(self, chunks: Iterable[Tensor]) -> None:
-        """Fit the normalisation on what `project` makes of the training samples, chunk by chunk."""
+        """Fit the normalisation to projected training samples, chunk by chunk."""
         self.normalisation.fit(chunks)
 
     def normalise(self, columns: Tensor) -> Tensor:
-        """(batch, len(names)) of what `project` gives."""
+        """Return (batch, len(names)) normalised columns of `project`."""
         normalised: Tensor = self.normalisation(columns)
         return normalised
 
     def forward(self, state: State) -> Tensor:
+        """Return (batch, len(names)) normalised inputs."""
         return self.normalise(self.project(state))
 
 
 class TypeParameters(nn.Module):
-    """Parameters of player types projected onto [-1, 1] by what the server draws; (batch, parameter, player)."""
+    """Parameters of player types, (batch, parameter, player), projected onto [-1, 1] by the server's ranges."""
 
     places: Tensor
     middle: Tensor
@@ -173,6 +188,6 @@ class TypeParameters(nn.Module):
         self.register_buffer("half_range", ((high - low) / 2)[:, None], persistent=False)
 
     def forward(self, types: Tensor) -> Tensor:
-        """``types``: (batch, players, fields)."""
+        """Return the projected parameters of ``types``, (batch, players, fields)."""
         values = types.index_select(2, self.places).transpose(1, 2)
         return (values - self.middle) / self.half_range

@@ -1,4 +1,4 @@
-"""Plans with the ball as an operation of PyTorch, so that they can be a part of what is exported."""
+"""Plans with the ball as an operation of PyTorch, so that an exported model can contain them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _near(ball: Tensor, players: Tensor, types: Tensor, server: Tensor, actor: T
 
 @torch.library.custom_op("teamclone::plan", mutates_args=())
 def _plans(ball: Tensor, players: Tensor, types: Tensor, server: Tensor, actor: Tensor) -> Tensor:
-    """Plan; see `planner.plan.plan`."""
+    """Plan for each sample; see `planner.plan.plan`."""
     parts = (ball, players, types, server, actor)
     near = _near(*parts)
     made = plan(*(part.index_select(0, near).cpu().numpy() for part in parts))

@@ -1,7 +1,7 @@
-"""How soon each player can have the ball, by the physics of the next cycles.
+"""The time in which each player can have the ball, by the physics of the next cycles.
 
-Vectorised over a batch and differentiable by none: these are inputs, not layers that learn. What is the same for all
-players of a frame is computed once.
+Vectorised over a batch and not differentiable: these are inputs, not layers that learn. Quantities that all players of
+a frame share are computed once.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from teamclone.world.state import State
 REACH_CYCLES = 40
 """Cycles for which reaching the ball is looked at; beyond it the rest of the way counts at full speed."""
 NEVER_CYCLES = 100.0
-"""Cycles to the ball of a player who is not on the field, and the most that anyone is given."""
+"""Cycles to the ball of a player off the field, and the maximum for all players."""
 MATE_RESERVE_M = 0.2
 """By how much agents of the league take a team mate's reach of the ball to be shorter, so as not to wait for it."""
 TURN_MARGIN_DEG = 15.0
 """A player dashes without a turn if the target is at most so far off the body."""
 BACKWARD_M = 10.0
-"""A target nearer than this may lie behind a player, who then runs backwards instead of turning."""
+"""A target nearer than this may lie behind a player, which then runs backwards instead of turning."""
 
 
 class Reach(NamedTuple):
-    """How soon players can have the ball, each as the actor judges it.
+    """The times in which players can have the ball, each as the actor judges it.
 
     Attributes:
-        steps: (batch, 22) cycles, 0 for a player who can kick it now, NEVER_CYCLES for one who is not on the field.
-        ball: (batch, REACH_CYCLES + 1, 2) where the ball is after 0, 1, ... cycles if nobody touches it.
+        steps: (batch, 22) cycles, 0 for a player that can kick it now, NEVER_CYCLES for one off the field.
+        ball: (batch, REACH_CYCLES + 1, 2) the ball's place after 0, 1, ... cycles if no player touches it.
     """
 
     steps: Tensor
@@ -66,7 +66,7 @@ def reach_ball(state: State, *, held: Tensor) -> Reach:
     Args:
         held: (batch,) bool, the ball is under an opponent's control and is taken to stay.
     """
-    if torch.compiler.is_exporting():  # each sample by itself: what is shared depends on the data
+    if torch.compiler.is_exporting():  # each sample by itself: sharing depends on the data
         cases, place = 2 * state.frame + held, torch.arange(state.actor.shape[0], device=held.device)
     else:
         cases, place = torch.unique(2 * state.frame + held, return_inverse=True)
@@ -77,7 +77,7 @@ def reach_ball(state: State, *, held: Tensor) -> Reach:
 
 
 class _Cases:
-    """Frames, each with the ball held or not: what is needed to reach it.
+    """Frames, each with the ball held or not, with the quantities that reaching it takes.
 
     Attributes:
         path: (cases, REACH_CYCLES + 1, 2) of the ball.
@@ -155,7 +155,7 @@ class _Dashes(NamedTuple):
     top_speed: Tensor
 
     def of(self, players: slice) -> _Dashes:
-        """Return those of some players."""
+        """Return the dashes of some players."""
         return _Dashes(*(part[:, players] for part in self))
 
     def steps(self, area: Tensor) -> Tensor:
@@ -177,6 +177,6 @@ def _first(holds: Tensor, *, otherwise: Tensor | float) -> Tensor:
 
 
 def ball_after(reach: Reach, steps: Tensor) -> Tensor:
-    """Return (batch, 2) where the ball is after ``steps`` (batch,) cycles, at most REACH_CYCLES."""
+    """Return (batch, 2) the ball's place after ``steps`` (batch,) cycles, at most REACH_CYCLES."""
     place = steps.round().clamp(0, REACH_CYCLES).long()
     return reach.ball.gather(1, place[:, None, None].expand(-1, 1, 2))[:, 0]

@@ -1,1 +1,1 @@
-"""Layers that know the game."""
+"""Layers that use the geometry and rules of the game."""

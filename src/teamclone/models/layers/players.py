@@ -1,8 +1,8 @@
-"""The other players as one with the ball sees them: each through the same weights, each beside all, in no order.
+"""Self-attention over the other players, as seen by the actor with the ball, in no order.
 
-A team mate is a place to pass to, an opponent one who may cut the pass off; which of them stands first in a list means
-nothing. So each is encoded alike, with the goal as one more place to kick to, and looks at all others (Vaswani et al.
-2017, "Attention is all you need"; one layer, normalised before as in Xiong et al. 2020).
+A team mate is a place to pass to, an opponent may cut the pass off; their order has no meaning. So all share the same
+weights, with the goal as one more place to kick to, and attend to each other (Vaswani et al. 2017, "Attention is all
+you need"; one layer, normalised before as in Xiong et al. 2020).
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from teamclone.rcss import pitch
 PLAYER_COLUMNS = 17
 """Inputs of each: `PlayerEncoder.columns`."""
 TARGETS = MATES + 1
-"""Whom or what to kick to: the team mates, then the goal."""
+"""Places to kick to: the team mates, then the goal."""
 PASS_SPEED = 2.7
-"""Of a hard pass, metres per cycle."""
+"""Ball speed of a hard pass, metres per cycle."""
 RUN_SPEED = 0.9
-"""Of an opponent at full speed."""
+"""Speed of a running opponent, metres per cycle."""
 NEVER_CYCLES = 20.0
 _THERE = OTHER.index("there")
 
 
 class PlayerEncoder(nn.Module):
-    """What the others are to the player who acts.
+    """Self-attention over the 21 other players and the goal.
 
     Args:
-        width: numbers by which each is known; a multiple of ATTENTION_HEADS.
-        seen: of what is known of the whole situation.
+        width: of the embedding of each; a multiple of ATTENTION_HEADS.
+        seen: width of the features of the whole situation.
     """
 
     goal: Tensor
@@ -50,7 +50,7 @@ class PlayerEncoder(nn.Module):
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
 
     def forward(self, situation: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
-        """All of them together, and each that one may kick to.
+        """Return the mean embedding, and the embedding of each pass target.
 
         Args:
             situation: (batch, seen). geometry: GEOMETRY and OTHER of all OTHERS, (batch, columns).
@@ -72,7 +72,7 @@ class PlayerEncoder(nn.Module):
         return each.mean(1), torch.cat([each[:, :MATES], each[:, OTHERS:]], 1)
 
     def columns(self, geometry: Tensor) -> Tensor:
-        """(batch, OTHERS + 1, PLAYER_COLUMNS): the others, then the goal, as seen from the ball."""
+        """Return (batch, OTHERS + 1, PLAYER_COLUMNS): the others, then the goal, as seen from the ball."""
         others = others_of(geometry)
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)
         decay = geometry_of(geometry, "ball_decay")[0][..., None]
@@ -98,7 +98,7 @@ class PlayerEncoder(nn.Module):
 
 
 def _lane(way: Tensor, distance: Tensor, opponents: Tensor, ball: Tensor, decay: Tensor) -> Tensor:
-    """(batch, places, 4) how free a straight kick to each place is.
+    """Return (batch, places, 4) how free a straight kick to each place is.
 
     Radians between it and the nearest opponent before the place; cycles that the ball is there before the first of
     them, if all run at RUN_SPEED to where it passes them, in tens; metres from the place to the nearest opponent, in

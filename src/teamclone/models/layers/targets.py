@@ -1,4 +1,4 @@
-"""Where a player makes for: places on the pitch that a small network supposes, seen from the player who acts.
+"""Target points: places on the pitch to which a player may be running, predicted by a small network.
 
 Most commands off the ball serve to come to a place that follows from the ball, the offside line and the player's role:
 first a turn towards it, then dashes. A network that only sees numbers would have to learn the rotation into the
@@ -21,11 +21,11 @@ from teamclone.rcss import pitch
 TARGET_COLUMNS = 10
 """Inputs that each place gives."""
 TURN_DEG = 15.0
-"""Agents of the league dash without a turn at what is closer to straight ahead."""
+"""Agents of the league dash without a turn at targets closer to straight ahead."""
 
 
 def layers(widths: Sequence[int], activation: type[nn.Module], dropout: float = 0.0) -> nn.Sequential:
-    """Linear layers, each with its activation; of no layers what it is given."""
+    """Return linear layers, each with its activation; for fewer than two widths the identity."""
     parts: list[nn.Module] = []
     for width_in, width_out in pairwise(widths):
         parts += [nn.Linear(width_in, width_out), activation()]
@@ -57,7 +57,7 @@ class TargetPoints(nn.Module):
         )
 
     def forward(self, context: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """What the places look like.
+        """Return the inputs of the places, and the bearing and dash power to each.
 
         Args:
             context: (batch, width). geometry: (batch, len(GEOMETRY)).
@@ -65,7 +65,7 @@ class TargetPoints(nn.Module):
         Returns:
             (batch, TARGET_COLUMNS * count) inputs; (batch, count) radians from the body to the place, from where the
             player comes to rest; (batch, count) dash power after which the player rolls as far as from there to the
-            place. So agents of the league reckon, though it counts the present velocity twice.
+            place. It counts the present velocity twice, but agents of the league compute it so.
         """
         if not self.count:
             nothing = context.new_zeros(context.shape[0], 0)
@@ -94,7 +94,7 @@ class TargetPoints(nn.Module):
                     aside / distance,
                     ((degrees.abs() - TURN_DEG) / 10).clamp(-1, 1),
                     (degrees / 10).clamp(-1, 1),
-                    # Whether straight on he would pass it within what counts as there, and whether he is there.
+                    # Whether a straight run passes within ``near`` of the place, and whether the player is there.
                     (aside.abs() - near).clamp(-1, 1),
                     (distance - near).clamp(-2, 2) / 2,
                     (power / 100).clamp(-0.5, 1.5),

@@ -22,7 +22,7 @@ PAUSES_S = (0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
 """How long to wait before each new attempt to reach a server that was reached before: a restart takes seconds."""
 
 FIRST_PAUSES_S = (0.2, 0.5, 1.0, 2.0)
-"""The same at first contact, when a wrong address is as likely as a restart."""
+"""How long to wait at first contact, when a wrong address is as likely as a restart."""
 
 _TRANSIENT = re.compile(
     r"refused|no such file|starting up|shutting down|not yet accepting|recovery mode|too many clients|timeout expired|"
@@ -35,10 +35,10 @@ _AGAIN = ("08", "57P01", "57P02", "57P03", "53300", "40001", "40P01")
 """SQLSTATEs (or their class) after which the same transaction may succeed: lost connections, restarts, deadlocks."""
 
 _reached: set[str] = set()
-"""The servers that this process has spoken to."""
+"""The URIs of the servers that this process has connected to."""
 
 ERRORS = (dbapi.Error, OSError)
-"""What the driver raises; the second while it reads the rows of an answer."""
+"""Errors that the driver raises; the second while it reads the rows of an answer."""
 
 
 class Connections:
@@ -50,7 +50,7 @@ class Connections:
         weakref.finalize(self, _close_all, self._idle)
 
     def transaction(self, work: Callable[[dbapi.Cursor], T]) -> T:
-        """What ``work`` gives, done in one transaction: all of it, or nothing and an error."""
+        """Return the result of ``work``, done in one transaction: all of it, or nothing and an error."""
 
         def once() -> T:
             connection = self._idle.pop() if self._idle else self.connect()
@@ -69,7 +69,12 @@ class Connections:
         return self.again(once)
 
     def again(self, attempt: Callable[[], T], *, asked: bool = False) -> T:
-        """What ``attempt`` gives, tried again while the server is away."""
+        """Return the result of ``attempt``, tried again while the server is away.
+
+        Raises:
+            StoreError: the server stayed away, or refused.
+            UsageError: with ``asked``, a query of the user's is wrong.
+        """
         pauses = iter(PAUSES_S if self.location.uri in _reached else FIRST_PAUSES_S)
         while True:
             try:
@@ -82,41 +87,45 @@ class Connections:
                 time.sleep(pause)
 
     def connect(self) -> dbapi.Connection:
+        """Open a new connection, which commits after each statement; it is not kept."""
         connection: dbapi.Connection = open_connection(self.location.uri, autocommit=True)
         _reached.add(self.location.uri)
         return connection
 
     def failure(self, error: Exception, *, asked: bool = False) -> StoreError | UsageError:
-        """The error for the user; ``asked``: his own query may be what is wrong."""
+        """Return the error for the user; ``asked``: the user's own query may be the cause."""
         state = getattr(error, "sqlstate", None) or ""
-        told = _told(error)
+        message = _server_message(error)
         for password in self.location.passwords:
-            told = told.replace(password, "***")
+            message = message.replace(password, "***")
         shown = self.location.shown
         if _connecting(error):
-            return StoreError(f"{shown}: cannot connect ({told}){_remedy(told)}")
+            return StoreError(f"{shown}: cannot connect ({message}){_remedy(message)}")
         if _passing(error):
             return StoreError(
-                f"{shown}: lost the connection ({told}); what was added before stays, try again when the server is back"
+                f"{shown}: lost the connection ({message}); "
+                "matches added before stay, try again when the server is back"
             )
-        if asked and "multiple commands" in told:
+        if asked and "multiple commands" in message:
             return UsageError("expected one SQL statement, got several")
         if asked and not state.startswith(("53", "58", "XX")):
-            return UsageError(told)
+            return UsageError(message)
         if state == "53100":
             return StoreError(f"{shown}: the server's disk is full; make room and ingest again, what is there stays")
         if state == "42501":
-            return StoreError(f"{shown}: {told}; docs/howto/postgresql.md lists the rights that a user needs")
-        return StoreError(f"{shown}: {told}")
+            return StoreError(f"{shown}: {message}; docs/howto/postgresql.md lists the rights that a user needs")
+        return StoreError(f"{shown}: {message}")
 
 
 def fetch(cursor: dbapi.Cursor, query: str, *values: str | None) -> list[dict[str, Any]]:
+    """Run a query whose ``$1``, ``$2``, ... are ``values``, and return its rows as dicts by column."""
     cursor.execute(query, values or None)
     found: list[dict[str, Any]] = cursor.fetch_arrow_table().to_pylist()
     return found
 
 
 def close(*handles: dbapi.Cursor | dbapi.Connection) -> None:
+    """Close cursors and connections, in this order; errors are ignored, as the connection may be lost."""
     for handle in handles:
         with suppress(Exception):
             handle.close()
@@ -132,7 +141,7 @@ def _connecting(error: Exception) -> bool:
 
 
 def _passing(error: Exception) -> bool:
-    """Whether the same may succeed in a moment."""
+    """Return whether another attempt may succeed in a moment."""
     if state := getattr(error, "sqlstate", None):
         return bool(state.startswith(_AGAIN))
     if _connecting(error):
@@ -142,17 +151,17 @@ def _passing(error: Exception) -> bool:
     return isinstance(error, OSError) or getattr(error, "status_code", None) is AdbcStatusCode.IO
 
 
-def _told(error: Exception) -> str:
-    """What the server says, on one line: its message, detail and hint without the query."""
-    said = re.findall(r"(?:ERROR|FATAL|PANIC|DETAIL|HINT): +(.+)", str(error))
-    if not said:
+def _server_message(error: Exception) -> str:
+    """Return the server's message, detail and hint on one line, without the query."""
+    parts = re.findall(r"(?:ERROR|FATAL|PANIC|DETAIL|HINT): +(.+)", str(error))
+    if not parts:
         first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        said = [re.sub(r"^[A-Z_]+: (\[libpq\] )?(Failed to connect: )?", "", first)]
-    return "; ".join(re.sub(r"\.? SQLSTATE: \w+$", "", text).strip().rstrip(".") for text in said)
+        parts = [re.sub(r"^[A-Z_]+: (\[libpq\] )?(Failed to connect: )?", "", first)]
+    return "; ".join(re.sub(r"\.? SQLSTATE: \w+$", "", text).strip().rstrip(".") for text in parts)
 
 
-def _remedy(told: str) -> str:
-    """What to do about a connection that failed."""
+def _remedy(message: str) -> str:
+    """Return advice about a connection that failed, to append to its error."""
     for sign, remedy in (
         ("password", "check user and password (PGPASSWORD and ~/.pgpass work, too)"),
         ('role "', "check the user"),
@@ -161,6 +170,6 @@ def _remedy(told: str) -> str:
         ("too many", "allow more connections, or use fewer --jobs"),
         ("invalid", "see docs/howto/postgresql.md for the form of the URL"),
     ):
-        if sign in told:
+        if sign in message:
             return f"; {remedy}"
     return "; does the server run there, and may you reach it?"

@@ -1,4 +1,4 @@
-"""The URL of a store in PostgreSQL: what it names, and what messages must not show of it."""
+"""The URL of a store in PostgreSQL: its parts, and the form for messages, without passwords."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEFAULTS = {
 
 
 class Secret(str):
-    """A URL that shows its password to nobody who only looks at it: its ``repr`` is masked, also inside others'."""
+    """A URL whose ``repr`` hides its password, also inside the ``repr`` of other objects."""
 
     __slots__ = ()
 
@@ -33,21 +33,24 @@ class Secret(str):
 
 
 def masked(location: str) -> str:
-    """The URL with ``***`` for its password. Up to the last @, since a password may hold one that is not encoded."""
+    """Return the URL with ``***`` for its password.
+
+    Up to the last @, since a password may hold one that is not encoded.
+    """
     location = re.sub(r"^(\w+://[^:@/?]*):.*@", r"\1:***@", location, flags=re.DOTALL)
     return re.sub(r"(password=)[^&]*", r"\1***", location)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Location:
-    """What a URL ``postgresql://user:password@host:port/database?schema=...`` means.
+    """A URL ``postgresql://user:password@host:port/database?schema=...``, taken apart.
 
     Attributes:
         url: the URL.
-        uri: what libpq takes: without ``schema``, with ``DEFAULTS``.
+        uri: the URL for libpq: without ``schema``, with ``DEFAULTS``.
         schema: the schema that holds the tables.
         shown: the URL for messages.
-        passwords: what messages must not show.
+        passwords: texts that messages must not show.
     """
 
     url: Secret
@@ -58,7 +61,8 @@ class Location:
 
     @classmethod
     def parse(cls, url: str) -> Self:
-        """
+        """Read a URL.
+
         Raises:
             UsageError: a part of the URL is wrong; the text does not show its password.
         """

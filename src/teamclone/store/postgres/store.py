@@ -38,19 +38,26 @@ class PostgresStore(Store):
     """
 
     def __init__(self, location: Location) -> None:
-        """Of a schema that is known to be a store; use ``open`` or ``create``."""
+        """Name a schema that is known to be a store; use ``open`` or ``create``."""
         self._location = location
         self._schema = _name(location.schema)
         self._connections = Connections(location)
 
     @property
     def location(self) -> str:
+        """The store's URL, whose ``repr`` hides the password."""
         return self._location.url
 
     # -- opening ---------------------------------------------------------------------------------------------------
 
     @classmethod
     def open(cls, url: str) -> Self:
+        """Open the store that a URL names.
+
+        Raises:
+            UsageError: the URL is wrong.
+            StoreError: the server cannot be reached, its schema holds no store, or its format is another one.
+        """
         store = cls(Location.parse(url))
         shown = store._location.shown
 
@@ -66,12 +73,18 @@ class PostgresStore(Store):
 
     @classmethod
     def create(cls, url: str) -> Self:
+        """Make a store in the schema that a URL names, or open the one that is there.
+
+        Raises:
+            UsageError: the URL is wrong.
+            StoreError: the server cannot be reached, refuses, or the schema holds other things.
+        """
         store = cls(Location.parse(url))
         store._connections.transaction(store._create)
         return store
 
     def _is_there(self, cursor: dbapi.Cursor) -> bool:
-        """Whether the schema holds a store of our format.
+        """Return whether the schema holds a store of our format.
 
         Raises:
             StoreError: its format is another one.
@@ -95,7 +108,7 @@ class PostgresStore(Store):
             cursor.execute(statement)
 
     def _definitions(self) -> Iterator[str]:
-        """The statements that make all tables."""
+        """Yield the statements that make all tables."""
         yield f"create table {self._schema}.{MARKER} (format integer not null, teamclone text not null)"
         yield f"insert into {self._schema}.{MARKER} values ({schema.FORMAT}, {_text(__version__)})"
         for table in schema.TABLES:
@@ -131,12 +144,14 @@ class PostgresStore(Store):
     # -- reading ---------------------------------------------------------------------------------------------------
 
     def match_ids(self) -> list[str]:
+        """Return the ids of the matches, sorted."""
         rows = self._connections.transaction(
             lambda cursor: fetch(cursor, f"select match_id from {self._schema}.matches")
         )
         return sorted(row["match_id"] for row in rows)
 
     def matches(self) -> pa.Table:
+        """Return the table ``matches``, by start, file name and id."""
         fields = schema.MATCHES.fields
         return self._connections.transaction(
             lambda cursor: self._read(
@@ -145,6 +160,7 @@ class PostgresStore(Store):
         )
 
     def read_table(self, match_id: str, table: str, *, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read a match's rows of one table by COPY; see `Store.read_table`."""
         wanted = schema.table(table)
         fields = wanted.select(columns)
         if wanted not in schema.MATCH_TABLES:
@@ -176,6 +192,7 @@ class PostgresStore(Store):
         return cursor.fetch_arrow_table().cast(schema.arrow_schema(fields))
 
     def stream(self, query: str) -> QueryRows:
+        """Answer a query in a read-only transaction on a connection of its own; see `Store.stream`."""
         _check_reads(query)
         connection, cursor = self._ask(query)
         try:
@@ -186,7 +203,7 @@ class PostgresStore(Store):
         return QueryRows(_plain_schema(reader.schema), self._batches(reader, cursor, connection))
 
     def _ask(self, query: str) -> tuple[dbapi.Connection, dbapi.Cursor]:
-        """A connection of its own that computes the answer to a query."""
+        """Return a connection of its own that computes the answer to a query."""
 
         def ask() -> tuple[dbapi.Connection, dbapi.Cursor]:
             connection = self._connections.connect()
@@ -215,7 +232,7 @@ class PostgresStore(Store):
                     [_plain(column, kind) for column, kind in zip(batch.columns, plain.types, strict=True)],
                     schema=plain,
                 )
-        except (*ERRORS, pa.ArrowException) as error:  # what the server finds wrong while it computes
+        except (*ERRORS, pa.ArrowException) as error:  # an error while the server computes rows
             raise self._connections.failure(error, asked=True) from None
         finally:
             reader.close()
@@ -224,6 +241,7 @@ class PostgresStore(Store):
     # -- writing ---------------------------------------------------------------------------------------------------
 
     def add(self, match: Match) -> Added:
+        """Insert a match in one transaction under the match's lock; see `Store.add`."""
         sources = convert.sources_of(match)
 
         def add(cursor: dbapi.Cursor) -> Added:
@@ -249,6 +267,8 @@ class PostgresStore(Store):
         return self._connections.transaction(add)
 
     def remove(self, match_id: str) -> None:
+        """Delete a match and its rows in all tables; nothing happens where it is not there."""
+
         def remove(cursor: dbapi.Cursor) -> None:
             self._lock(cursor, match_id)
             cursor.execute(f"delete from {self._schema}.matches where match_id = {_text(match_id)}")
@@ -260,10 +280,12 @@ class PostgresStore(Store):
         return Sources(**found[0]) if found else None
 
     def files(self) -> list[FileStatus]:
+        """Return the status of every source file, by path."""
         rows = self._connections.transaction(lambda cursor: fetch(cursor, f"select * from {self._schema}.files"))
         return sorted(map(_status, rows), key=lambda status: status.path)
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:
+        """Insert the statuses, or update the rows of files that have one."""
         # In one order, so that two ingests do not wait for each other.
         rows = [_row(status) for status in sorted(statuses, key=lambda status: status.key)]
         if not rows:
@@ -283,11 +305,11 @@ class PostgresStore(Store):
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Nothing to hold and nothing to tidy: a match is a transaction under its own lock."""
+        """Do nothing: a match is a transaction under its own lock."""
         yield
 
     def _lock(self, cursor: dbapi.Cursor, what: str) -> None:
-        """Wait until nobody else writes ``what``, and hold it until this transaction ends."""
+        """Wait until no other transaction writes ``what``, and lock it until this one ends."""
         # Where the writer's machine vanishes, the server notices and lets go.
         fetch(
             cursor,
@@ -300,7 +322,7 @@ class PostgresStore(Store):
 
 
 def _trust_keys(cursor: dbapi.Cursor) -> None:
-    """Where the user may, let this transaction skip the check that each row's match exists: it just wrote the match.
+    """Skip the check that each row's match exists, where the user may: this transaction just wrote the match.
 
     The check is one query a row and costs as much as all the rest (docs/howto/postgresql.md).
     """
@@ -312,12 +334,12 @@ def _trust_keys(cursor: dbapi.Cursor) -> None:
 
 
 def _name(name: str) -> str:
-    """A name as SQL."""
+    """Return a name as SQL."""
     return '"' + name.replace('"', '""') + '"'
 
 
 def _text(text: str) -> str:
-    """A text as SQL."""
+    """Return a text as SQL."""
     return "'" + text.replace("'", "''") + "'"
 
 
@@ -328,7 +350,7 @@ _QUERIES = ("select", "with", "values", "table")
 
 
 def _check_reads(query: str) -> None:
-    """Say clearly what is no query; what looks like one is the server's to judge."""
+    """Raise on a statement that is clearly no query; the server judges the rest."""
     found = _FIRST_WORD.match(query)
     word = found[1].lower() if found else ""
     if not word:
@@ -341,7 +363,7 @@ def _check_reads(query: str) -> None:
 
 
 def _plain_schema(found: pa.Schema) -> pa.Schema:
-    """The types of an answer without PostgreSQL's own: numeric as double, others as they come (text or bytes)."""
+    """Return the types of an answer without PostgreSQL's own: numeric as double, others as text or bytes."""
 
     def plain(kind: pa.DataType) -> pa.DataType:
         if not isinstance(kind, pa.OpaqueType):
@@ -359,7 +381,7 @@ def _plain(column: pa.Array, kind: pa.DataType) -> pa.Array:
 
 
 def _escaped(text: str | None) -> str | None:
-    r"""A text that PostgreSQL takes: zero bytes and bytes of file names that are no UTF-8 become ``\u0000``."""
+    r"""Return a text that PostgreSQL takes: zero bytes and bytes of file names that are no UTF-8 become ``\u0000``."""
     if text is None:
         return None
     return re.sub("[\\\\\0\ud800-\udfff]", lambda sign: rf"\u{ord(sign[0]):04x}" if sign[0] != "\\" else r"\\", text)

@@ -24,7 +24,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ from teamclone.evaluation.evaluate import count_training
 from teamclone.evaluation.predict import predict, truth
 from teamclone.evaluation.predictions import Predictions
 from teamclone.models.clone import parameter_count
-from teamclone.models.config import BLOCKS
+from teamclone.models.config import BLOCKS, FAMILIES
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.planned import plans
 from teamclone.models.inputs.reach import kickable_area, reach_ball
@@ -55,6 +55,7 @@ from teamclone.planner.plan import CHOICES
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.system.documents import write_document
 from teamclone.system.machine import processor
+from teamclone.system.settings import assignment
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
 from teamclone.world.channels import CHANNEL
@@ -153,6 +154,15 @@ def without(blocks: Sequence[str], *names: str) -> str:
     return ",".join(block for block in blocks if block not in names)
 
 
+def of_family(overrides: tuple[str, ...]) -> tuple[str, ...]:
+    """The overrides that the model family among them has; all where they name none."""
+    values = dict(assignment(text) for text in overrides)
+    if "model.family" not in values:
+        return overrides
+    known = {"family", *(item.name for item in fields(FAMILIES[values["model.family"]]))}
+    return tuple(text for text in overrides if not text.startswith("model.") or text[6:].partition("=")[0] in known)
+
+
 def ablations() -> dict[str, tuple[str, ...]]:
     """`plain` without each of its parts, and with those it leaves out: name and settings beside PLAIN."""
     model = load_config("best", PLAIN).model
@@ -212,7 +222,7 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
     made.append(Experiment(name="plain", step="def", preset="best", overrides=(*short, *PLAIN)))
     for step, beside, variants in (("k", (), KICKS), ("d", PLAIN, ablations()), ("e", PLAIN, REMEDIES)):
         made += [
-            Experiment(name=name, step=step, preset="best", overrides=(*short, *beside, *changes))
+            Experiment(name=name, step=step, preset="best", overrides=of_family((*short, *beside, *changes)))
             for name, changes in variants.items()
         ]
     return made

@@ -224,7 +224,7 @@ BASES: dict[str, Sequence[str]] = {
     "weights": ("train.balance=weights",),
 }
 CHANGES: dict[str, tuple[str, Sequence[str]]] = {
-    "model.family": ("relative", ["model.family=egocentric-point"]),
+    "model.family": ("paper", ["model.family=egocentric-point", "model.blocks=self", "model.target_points=0"]),
     "model.own_type": ("paper", ["model.own_type=true"]),
     "model.all_types": ("paper", ["model.all_types=kick"]),
     "model.blocks": ("relative", ["model.blocks=self,role"]),

@@ -46,7 +46,7 @@ class EgocentricTrunk(nn.Module):
     def __init__(self, config: EgocentricTrunkConfig, features: EgocentricFeatures) -> None:
         super().__init__()
         activation = _ACTIVATIONS[config.activation]
-        self.n_inputs = features.n_inputs
+        self.layout = features.layout
         for name, blocks in (
             ("command_columns", config.blocks),
             ("kick_columns", _kick_blocks(config)),
@@ -64,28 +64,28 @@ class EgocentricTrunk(nn.Module):
             )
             self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.kick_dropout)
             width = config.kick_attention
-            self.crowd = PlayerEncoder(width, config.kick_hidden[-1]) if width else None
+            self.players = PlayerEncoder(width, config.kick_hidden[-1]) if width else None
 
-    def forward(self, inputs: Tensor, *, kicks: Tensor | None = None) -> TrunkOutput:
-        """``kicks``: which of the situations need the layers of a kick, (n,) places; None for all."""
-        columns, geometry = inputs[:, : self.n_inputs], inputs[:, self.n_inputs :]
-        targets, bearing, power = self.targets(columns.index_select(1, self.target_columns), geometry)
-        seen = torch.cat([columns.index_select(1, self.command_columns), targets], 1)
+    def forward(self, packed: Tensor, *, kicks: Tensor | None = None) -> TrunkOutput:
+        """Return features of the command and its parameters; ``kicks`` as in `Clone.answer_inputs`."""
+        inputs = self.layout.unpack(packed)
+        targets, bearing, power = self.targets(inputs.columns.index_select(1, self.target_columns), inputs.geometry)
+        seen = torch.cat([inputs.columns.index_select(1, self.command_columns), targets], 1)
         hidden = self.command(seen)
-        parameters, at_ball = hidden[:0], KickFeatures(hidden[:0], geometry[:0], None)
+        parameters, at_ball = hidden[:0], KickFeatures(hidden[:0], self.layout.unpack(packed[:0]), None)
         if self.answers:
             parameters = self.parameters_of(torch.cat([seen, hidden], 1).detach())
-            at_ball = self.at_ball(inputs if kicks is None else inputs.index_select(0, kicks))
-        return TrunkOutput(hidden, parameters, at_ball, kicks, geometry, bearing, power)
+            at_ball = self.at_ball(packed if kicks is None else packed.index_select(0, kicks))
+        return TrunkOutput(hidden, parameters, at_ball, kicks, inputs.geometry, bearing, power)
 
-    def at_ball(self, inputs: Tensor) -> KickFeatures:
-        """What kicks and tackles hang on, which is nothing that the other layers find."""
-        both = torch.cat([inputs, inputs * self.signs])
-        kick, geometry, targets = self.kick(both.index_select(1, self.kick_columns)), both[:, self.n_inputs :], None
-        if self.crowd is not None:
-            together, targets = self.crowd(kick, geometry)
+    def at_ball(self, packed: Tensor) -> KickFeatures:
+        """Return the features of kicks and tackles; they share no weights with the layers of the command."""
+        inputs, targets = self.layout.unpack(torch.cat([packed, packed * self.signs])), None
+        kick = self.kick(inputs.columns.index_select(1, self.kick_columns))
+        if self.players is not None:
+            together, targets = self.players(kick, inputs)
             kick = torch.cat([kick, together], 1)
-        return KickFeatures(kick, geometry, targets)
+        return KickFeatures(kick, inputs, targets)
 
 
 class Trunks(nn.Module):
@@ -95,15 +95,17 @@ class Trunks(nn.Module):
         super().__init__()
         self.members = nn.ModuleList(members)
 
-    def forward(self, inputs: Tensor, **options: Any) -> list[Any]:
-        return [member(inputs, **options) for member in self.members]
+    def forward(self, packed: Tensor, **options: Any) -> list[Any]:
+        """Return the output of each member; ``options`` as in its ``forward``."""
+        return [member(packed, **options) for member in self.members]
 
-    def at_ball(self, inputs: Tensor) -> list[KickFeatures]:
-        return [cast(EgocentricTrunk, member).at_ball(inputs) for member in self.members]
+    def at_ball(self, packed: Tensor) -> list[KickFeatures]:
+        """Return the features of kicks and tackles of each member."""
+        return [cast(EgocentricTrunk, member).at_ball(packed) for member in self.members]
 
 
 class Clone(nn.Module):
-    """A network that plays like a team: which command a player gives in a situation, and with which parameters."""
+    """The clone of a team: from a state to the command that a player gives, and its parameters."""
 
     features: PaperFeatures | EgocentricFeatures
     trunk: nn.Sequential | EgocentricTrunk | Trunks
@@ -125,6 +127,7 @@ class Clone(nn.Module):
 
     @property
     def inputs(self) -> Features:
+        """The inputs of the model, with their normalisation."""
         return cast(Features, self.features)
 
     def answer(self, state: State, *, kicks: Tensor | None = None) -> Answer:
@@ -163,11 +166,12 @@ class Clone(nn.Module):
         return self.config.parameter_weight * head.kick_loss(head.kicks(trunk.at_ball(inputs)), target, of=of)
 
     def forward(self, state: State) -> Prediction:
+        """Return the likeliest answer to a state."""
         return self.answer(state).point()
 
     @torch.no_grad()
     def predict(self, state: State) -> tuple[Tensor, Tensor]:
-        """Probabilities (batch, commands) and parameters (batch, parameters) in power, degrees and metres.
+        """Return probabilities (batch, commands) and parameters (batch, parameters) in power, degrees and metres.
 
         Their order is that of ``config.commands`` and of its `parameters_of`; by default four and six.
         """
@@ -216,12 +220,12 @@ def _head(config: ModelConfig) -> PointHead | MixtureHead:
 
 
 def parameter_count(model: nn.Module) -> int:
-    """Number of trained weights."""
+    """Return the number of trained weights."""
     return sum(weights.numel() for weights in model.parameters())
 
 
 def model_id(model: nn.Module) -> str:
-    """A hash of the weights: whether numbers belong to this very model."""
+    """Return a hash of the weights, by which figures are known to belong to this model."""
     digest = hashlib.blake2b(digest_size=8)
     for name, tensor in sorted(model.state_dict().items()):
         digest.update(name.encode())

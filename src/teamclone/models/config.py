@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from teamclone.rcss.commands import CLONED, REPERTOIRE, not_of_repertoire
 from teamclone.rcss.player_types import GROUPS
-from teamclone.system.settings import setting, without_effect
+from teamclone.system.settings import setting
 
 BLOCKS = (
     "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
@@ -78,7 +78,7 @@ class EgocentricTrunkConfig(ModelConfig):
         blocks: inputs that decide on the command, see `inputs.egocentric.EgocentricFeatures`.
         target_points: places on the pitch that the network supposes a player to make for; see
             `layers.targets.TargetPoints`. 0 for none.
-        target_hidden: widths of the layers that find them.
+        target_hidden: widths of the layers that find them, if there are any.
     """
 
     blocks: tuple[str, ...] = setting(
@@ -86,12 +86,6 @@ class EgocentricTrunkConfig(ModelConfig):
     )
     target_points: int = setting(6, at_least=0)
     target_hidden: tuple[int, ...] = setting((512, 256), at_least=1)
-
-    def problems(self, key: str) -> list[str]:
-        """Return settings that would have no effect; see `system.settings.from_table`."""
-        if self.target_points:
-            return []
-        return without_effect(self, key, ("target_hidden",), f"{key}.target_points = 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +112,7 @@ class EgocentricConfig(EgocentricTrunkConfig):
         kick_dropout: `dropout` of these, of which there are few examples.
         kick_attention: numbers by which these layers know each other player; see `layers.players.PlayerEncoder`.
             A multiple of ATTENTION_HEADS; 0 for no such layers.
-        target_weight: of the error by which turns teach the target points, in training.
+        target_weight: of the error by which turns teach the target points, if there are any, in training.
         extra_kicks: kicks and tackles shown beside each batch to the layers that find their parameters.
     """
 
@@ -131,12 +125,6 @@ class EgocentricConfig(EgocentricTrunkConfig):
     kick_attention: int = setting(64, at_least=0, rule=_attention)
     target_weight: float = setting(0.1, at_least=0)
     extra_kicks: int = setting(64, at_least=0)
-
-    def problems(self, key: str) -> list[str]:
-        """Return settings that would have no effect; see `system.settings.from_table`."""
-        if self.target_points:
-            return []
-        return without_effect(self, key, ("target_hidden", "target_weight"), f"{key}.target_points = 0")
 
 
 FAMILIES: dict[str, type[ModelConfig]] = {

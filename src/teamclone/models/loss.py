@@ -30,8 +30,10 @@ class Balance(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """The training error and two parts of it, scalars: ``total = cross_entropy + weight * parameters`` and, of a
-    `MixtureHead`, what teaches the target points."""
+    """The training error and two parts of it, scalars.
+
+    ``total = cross_entropy + weight * parameters`` and, of a `MixtureHead`, the error that teaches the target points.
+    """
 
     total: Tensor
     cross_entropy: Tensor
@@ -123,7 +125,7 @@ def mixture_loss(
         to_targets: (batch,) log-likelihood of the turns by the target points alone, 0 of other commands; None without
             target points.
         target_weight: of its mean.
-        target, weight, balance, whole: as of `point_loss`.
+        target, weight, balance, whole: see `point_loss`.
     """
     n = len(target.kind if whole is None else whole)
     cross_entropy = command_loss(logits, target.kind, balance=balance, of=n)

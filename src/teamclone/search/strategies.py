@@ -19,7 +19,6 @@ from teamclone.search.trials import (
     Trial,
     rank,
 )
-from teamclone.system.settings import table_of
 from teamclone.training.config import WITH_ADAM, TrainConfig
 
 OPTIMISERS = ("adam", "rmsprop", "adagrad")
@@ -154,10 +153,6 @@ class Study:
             factor = base.data.batch_size / chosen["data.batch_size"]
             for name in ("batches_per_epoch", "validation_batches"):
                 settings[f"data.{name}"] = int(getattr(base.data, name) * factor)
-        if chosen.get("model.target_points") == 0:
-            # Without target points these have no effect, which is refused unless they have their defaults.
-            usual = table_of(type(base.model)())
-            settings |= {f"model.{name}": usual[name] for name in ("target_hidden", "target_weight") if name in usual}
         return [Trial(name=f"{len(trials):04d}", settings=settings)]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:

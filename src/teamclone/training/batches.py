@@ -59,7 +59,7 @@ class Batches:
         cache_bytes: memory that inputs made once may take.
         rows: all samples that batches will be asked for.
         mirrored: samples by which players' counterparts are found, if batches will be asked for mirrored samples.
-        on_progress: told how many of them are made, and how many there are.
+        on_progress: called with how many of them are made, and how many there are.
     """
 
     def __init__(

@@ -59,7 +59,7 @@ def train(
     base: Base | None = None,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Run:
-    """Train a clone, from fresh weights or from those of ``base``; `run` says what a run folder holds.
+    """Train a clone, from fresh weights or from those of ``base``; see `run` for what a run folder holds.
 
     Every epoch ends with a checkpoint from which ``resume`` goes on exactly as if nothing had happened: weights,
     order of the samples and figures are a pure function of config and dataset (on one machine, with as many threads).

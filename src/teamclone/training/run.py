@@ -106,6 +106,7 @@ class Run:
 
     @property
     def metrics_path(self) -> Path:
+        """The file of `history`."""
         return self.path / "metrics.jsonl"
 
     def checkpoint_path(self, name: str) -> Path:
@@ -253,6 +254,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def save_config(path: Path, config: Config) -> None:
+    """Write the settings of a run into its folder."""
     write_atomic(path / "config.toml", to_toml(config).encode())
 
 

@@ -69,7 +69,9 @@ def prepare(
     base: Base | None,
     on_progress: Callable[[int, int], None],
 ) -> Setup:
-    """Set up a training; ``stack`` holds its lock and its group of processes. Arguments and errors as of `loop.train`.
+    """Set up a training; ``stack`` holds its lock and its group of processes.
+
+    Arguments and errors are those of `loop.train`.
 
     Args:
         on_progress: called with the samples whose inputs are made, and their number.

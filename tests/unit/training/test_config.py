@@ -180,8 +180,6 @@ def test_mistakes_of_the_egocentric_family_are_named(text: str, answer: str) -> 
             "weight_decay has no effect with train.opt",
         ),
         ("paper", ["train.balance_strength=0.5"], "train.balance_strength has no effect with train.balance = none"),
-        ("best", ["model.target_points=0", "model.target_weight=1"], "target_weight has no effect with model.target_p"),
-        ("best", ["model.target_points=0", "model.target_hidden=8"], "target_hidden has no effect with model.target_p"),
     ],
 )
 def test_settings_that_would_have_no_effect_are_refused(preset: str, settings: list[str], answer: str) -> None:

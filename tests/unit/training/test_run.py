@@ -68,7 +68,7 @@ def test_missing_foreign_or_other_format(tmp_path: Path, dataset: Dataset, confi
         with pytest.raises(RunError, match="not the description of a run"):
             open_run(run.path)
     environment.write_text(json.dumps(run.environment))
-    for text, answer in (("[model", "not TOML"), ("[model]\nwidth = 3\n", "no setting 'model.width'")):
+    for text, answer in (("[model", "not TOML"), ("[model]\nwidth = 3\n", "no setting model.width")):
         (run.path / "config.toml").write_text(text)
         with pytest.raises(RunError, match=answer):
             open_run(run.path)

@@ -32,6 +32,7 @@ class EnsembleAnswer(Answer):
 
     @cached_property
     def merged(self) -> Any:
+        """The one answer that the members give together."""
         merged = self._merge(self.members)
         merged.temperature = self.temperature
         return merged
@@ -43,14 +44,17 @@ class EnsembleAnswer(Answer):
         return logits
 
     def point(self) -> Prediction:
+        """Return the likeliest answer, that of `merged`."""
         prediction: Prediction = self.merged.point()
         return prediction
 
     def log_likelihood(self, target: Target) -> Tensor:
+        """Return (batch,) log-likelihood of the parameters under `merged`."""
         likelihood: Tensor = self.merged.log_likelihood(target)
         return likelihood
 
     def draw_parameters(self, kind: Tensor, generator: torch.Generator | None) -> Tensor:
+        """Draw (batch, 2) parameters of `merged`, see `Answer.draw_parameters`."""
         parameters: Tensor = self.merged.draw_parameters(kind, generator)
         return parameters
 
@@ -74,6 +78,7 @@ class EnsembleHead(nn.Module):
         return self.members[0]
 
     def forward(self, seen: Sequence[Any]) -> EnsembleAnswer:
+        """Return the common answer to the outputs of the members' trunks."""
         answers = [member(of) for member, of in zip(self.members, seen, strict=True)]
         return EnsembleAnswer(answers, self._first.merged, self.temperature)
 

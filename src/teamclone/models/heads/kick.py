@@ -13,7 +13,7 @@ from torch.nn import functional
 from teamclone.dynamics.formulas import covered, roll
 from teamclone.models import distributions as mixture
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
-from teamclone.models.inputs.geometry import MATES, geometry_of, mates_of, ways_of
+from teamclone.models.inputs.geometry import MATES, Inputs, geometry_of, mates_of
 from teamclone.planner.plan import WAYS
 from teamclone.rcss import pitch
 
@@ -60,11 +60,11 @@ class Planned(nn.Module):
         self.share = nn.Linear(width, len(WAYS))
         self.error = nn.Parameter(torch.zeros(len(WAYS)))
 
-    def forward(self, hidden: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
+    def forward(self, hidden: Tensor, inputs: Inputs) -> tuple[Mixture, Mixture]:
         """Return mixtures of power and direction, see `Kicks.forward`."""
         share = self.share(hidden).float()
         with torch.autocast(hidden.device.type, enabled=False):
-            ways = ways_of(geometry)
+            ways, geometry = inputs.ways, inputs.geometry
             logits = torch.where(ways[..., 0] > 0, share, IMPOSSIBLE)
             power, angle = kick_for(ways[..., 1:], geometry)
             gain = geometry_of(geometry, "kick_gain")[0].clamp(min=5e-3)
@@ -83,7 +83,7 @@ class Kicks(nn.Module):
     Args:
         width: of the features of kicks.
         target_width: of the embedding of each of `players.TARGETS`, the team mates and the goal; 0 for none.
-        planned: add those of `Planned`; the geometry ends in WAY then.
+        planned: add those of `Planned`, from the ways of the inputs.
     """
 
     goal: Tensor
@@ -97,17 +97,17 @@ class Kicks(nn.Module):
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
-    def forward(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None = None) -> tuple[Mixture, Mixture]:
+    def forward(self, hidden: Tensor, inputs: Inputs, targets: Tensor | None = None) -> tuple[Mixture, Mixture]:
         """Return mixtures of power and direction (radians from the body).
 
         Args:
-            hidden: (batch, width). geometry: (batch, at least len(GEOMETRY)).
+            hidden: (batch, width). inputs: of (batch) situations.
             targets: (batch, TARGETS, target width), None for nothing.
         """
-        free = self._free(hidden, geometry, targets)
+        free = self._free(hidden, inputs.geometry, targets)
         if self.planned is None:
             return free
-        power, angle = (mixture.concatenate(pair) for pair in zip(free, self.planned(hidden, geometry), strict=True))
+        power, angle = (mixture.concatenate(pair) for pair in zip(free, self.planned(hidden, inputs), strict=True))
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:

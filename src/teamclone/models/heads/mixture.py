@@ -25,7 +25,7 @@ from teamclone.models.distributions import (
 )
 from teamclone.models.heads.kick import Kicks
 from teamclone.models.heads.trunk_output import KickFeatures, TrunkOutput
-from teamclone.models.inputs.geometry import geometry_of, tackle_of
+from teamclone.models.inputs.geometry import geometry_of
 from teamclone.models.loss import Balance, Loss, mixture_loss
 from teamclone.planner import tackle as tackling
 from teamclone.rcss import pitch
@@ -136,9 +136,15 @@ class MixtureAnswer(Answer):
         return Prediction(self.logits, torch.stack(parameters, 1))
 
     def log_likelihood(self, target: Target) -> Tensor:
+        """Return (batch,) log-likelihood, in nats, of the parameters of the command given."""
         return _chosen(self.distribution, target, [_mean_kick(self.distribution.kick)])
 
     def draw_parameters(self, kind: Tensor, generator: torch.Generator | None) -> Tensor:
+        """Draw (batch, 2) parameters of these commands, see `Answer.draw_parameters`.
+
+        Raises:
+            ValueError: the answer leaves out kicks.
+        """
         of = self.distribution
         if of.kicks is not None:
             raise ValueError("cannot sample an answer that leaves out kicks; ask the clone without kicks=")
@@ -173,7 +179,7 @@ class MixtureHead(nn.Module):
     """Command probabilities, and for each command a distribution of its parameters.
 
     Components depend on what a player may want: to face the ball, the place where it is met, or a target point; to come
-    to rest there; to spend a multiple of the stamina recovered in a cycle; to kick as `heads.kick.Kicks` says. The
+    to rest there; to spend a multiple of the stamina recovered in a cycle; to kick by one of `heads.kick.Kicks`. The
     network gives their shares, small corrections and scales.
 
     A parameter known to a hundredth of a degree pulls a thousand times harder than a command; so the layers that they
@@ -228,6 +234,7 @@ class MixtureHead(nn.Module):
         self.register_buffer("temperature", torch.ones(()))
 
     def forward(self, situation: TrunkOutput) -> MixtureAnswer:
+        """Return the answer to the output of an egocentric trunk."""
         command = self.command(situation.hidden).float()
         dash, turn = (layer(situation.parameters).float() for layer in (self.dash, self.turn))
         kick = self.kicks(situation.at_ball)
@@ -295,11 +302,11 @@ class MixtureHead(nn.Module):
         return Move(Mixture(logits, x, x_scale), Mixture(logits, y, y_scale))
 
     def kicks(self, seen: KickFeatures) -> tuple[Kick, Kick]:
-        """As the situation is and from its mirror: what is right on the left is right on the right."""
+        """Return the answers on kicks and tackles: from the situation, and from its mirror image mirrored back."""
         both = self.kick(*seen)
         tackle = self.tackle(seen.hidden).float()
         if self.planned_tackle is not None:
-            there, degrees = tackle_of(seen.geometry).unbind(1)
+            there, degrees = seen.inputs.tackle.unbind(1)
             trust = there[:, None] * self.planned_tackle(seen.hidden).float()
             tackle = tackle.scatter_add(1, class_of(degrees, TACKLE_DIRECTIONS)[:, None], trust)
         (power, power_mirrored), (direction, direction_mirrored) = (mixture.halves(part) for part in both)

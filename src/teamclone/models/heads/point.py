@@ -48,9 +48,11 @@ class PointAnswer(Answer):
         self.projected, self.limits, self.commands = projected, limits, commands
 
     def point(self) -> Prediction:
+        """Return the logits and the predicted parameters."""
         return Prediction(self.logits, self.projected * self.limits)
 
     def log_likelihood(self, target: Target) -> Tensor:
+        """Return (batch,) log-density, in nats, of the parameters of the command given, see `POINT_SCALE`."""
         away = self.projected - projected_parameters(target, self.commands)
         angle = torch.tensor([of.angle for of in parameters_of(self.commands)], device=away.device)
         away = torch.where(angle, torch.remainder(away + 1, 2) - 1, away)
@@ -59,6 +61,7 @@ class PointAnswer(Answer):
         return torch.where(issued(target.kind, self.commands), each, 0.0).sum(1)
 
     def draw_parameters(self, kind: Tensor, generator: torch.Generator | None) -> Tensor:
+        """Return (batch, 2) predicted parameters of these commands; nothing is drawn."""
         _, argument, _ = parameter_layout(kind.device, self.commands)
         values = torch.where(issued(kind, self.commands), self.point().parameters, 0.0)
         return values.new_zeros(len(kind), 2).index_add(1, argument, values)

@@ -6,18 +6,20 @@ from typing import NamedTuple
 
 from torch import Tensor
 
+from teamclone.models.inputs.geometry import Inputs
+
 
 class KickFeatures(NamedTuple):
     """Features for kicks and tackles: first of the situations, then of their mirror images.
 
     Attributes:
-        hidden: (2 * kicks, kick width). geometry: (2 * kicks, columns of geometry).
+        hidden: (2 * kicks, kick width). inputs: of (2 * kicks) situations.
         targets: (2 * kicks, TARGETS, width) embedding by `PlayerEncoder` of each team mate and of the goal; None
             without an encoder.
     """
 
     hidden: Tensor
-    geometry: Tensor
+    inputs: Inputs
     targets: Tensor | None
 
 
@@ -29,7 +31,7 @@ class TrunkOutput(NamedTuple):
         parameters: (batch, parameter width) features of dashes and turns; empty where the head has no use for them.
         at_ball: features of kicks and tackles; empty where the head has no use for them.
         kicks: (kicks,) indices of the situations that ``at_ball`` describes; None for all.
-        geometry: (batch, at least len(GEOMETRY)).
+        geometry: (batch, len(GEOMETRY)).
         bearing: (batch, targets) radians from the body to each of the `TargetPoints`.
         power: (batch, targets) dash power towards each of them.
     """

@@ -19,13 +19,12 @@ from teamclone.models.config import BLOCKS
 from teamclone.models.inputs.actor_view import ActorView
 from teamclone.models.inputs.axes import polar
 from teamclone.models.inputs.geometry import (
-    GEOMETRY,
     MATES,
-    OTHER,
     OTHERS,
     SIDED,
     TACKLE,
     WAY,
+    InputLayout,
 )
 from teamclone.models.inputs.paper import Normalisation, TypeParameters
 from teamclone.models.inputs.reach import REACH_CYCLES
@@ -65,13 +64,14 @@ _MODE_COLUMN = np.where(SITUATION < _SIDED, SITUATION, 2 * SITUATION - _SIDED + 
 
 
 class EgocentricFeatures(nn.Module):
-    """The columns of the chosen blocks, normalised and limited, then GEOMETRY as it is.
-
-    With the block ``plan`` TACKLE and WAY follow.
+    """The columns of the chosen blocks, normalised and limited, then the other parts of `Inputs` as they are.
 
     Args:
-        blocks: some of BLOCKS; ``scene`` is always among the columns.
-        others: have OTHER of all OTHERS, as they are, right after GEOMETRY.
+        blocks: some of BLOCKS; ``scene`` is always among the columns, and tackle and ways are with ``plan``.
+        others: have OTHER of all OTHERS.
+
+    Attributes:
+        names: of all columns. n_inputs: how many of them are normalised. layout: where each part is.
     """
 
     signs: Tensor
@@ -91,13 +91,12 @@ class EgocentricFeatures(nn.Module):
         self.register_buffer("mode_column", torch.from_numpy(_MODE_COLUMN), persistent=False)
         blank = ActorView(_blank(self.history))
         widths = {name: _BLOCKS[name](self, blank).shape[1] for name in ("scene", *self.blocks)}
+        self.layout = InputLayout(columns=sum(widths.values()), others=others, plan="plan" in self.blocks)
+        self.n_inputs = self.layout.columns
         self.names = (
             *(f"{name}_{i}" for name, width in widths.items() for i in range(width)),
-            *GEOMETRY,
-            *(f"other_{i}_{name}" for i in range(OTHERS if others else 0) for name in OTHER),
-            *((*TACKLE, *WAY) if "plan" in self.blocks else ()),
+            *self.layout.tail,
         )
-        self.n_inputs = self.names.index(GEOMETRY[0])
         self.normalisation = Normalisation(self.n_inputs)
         self.register_buffer("signs", self._signs(), persistent=False)
 

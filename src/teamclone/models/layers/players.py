@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from teamclone.dynamics.formulas import cycles_over
 from teamclone.models.config import ATTENTION_HEADS
-from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, geometry_of, others_of
+from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, Inputs, geometry_of
 from teamclone.rcss import pitch
 
 PLAYER_COLUMNS = 17
@@ -49,17 +49,17 @@ class PlayerEncoder(nn.Module):
         self.think = nn.Sequential(nn.Linear(width, 2 * width), nn.ReLU(), nn.Linear(2 * width, width))
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
 
-    def forward(self, situation: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, situation: Tensor, inputs: Inputs) -> tuple[Tensor, Tensor]:
         """Return the mean embedding, and the embedding of each pass target.
 
         Args:
-            situation: (batch, seen). geometry: GEOMETRY and OTHER of all OTHERS, (batch, columns).
+            situation: (batch, seen). inputs: with others.
 
         Returns:
             (batch, width) and (batch, TARGETS, width).
         """
-        with torch.autocast(geometry.device.type, enabled=False):
-            columns = self.columns(geometry)
+        with torch.autocast(situation.device.type, enabled=False):
+            columns = self.columns(inputs)
         each = self.other(columns) + self.situation(situation)[:, None]
         n, count, width = each.shape
         asked = self.ask(self.before(each)).view(n, count, 3, ATTENTION_HEADS, width // ATTENTION_HEADS)
@@ -71,9 +71,9 @@ class PlayerEncoder(nn.Module):
         each = self.after(each + self.think(self.between(each)))
         return each.mean(1), torch.cat([each[:, :MATES], each[:, OTHERS:]], 1)
 
-    def columns(self, geometry: Tensor) -> Tensor:
+    def columns(self, inputs: Inputs) -> Tensor:
         """Return (batch, OTHERS + 1, PLAYER_COLUMNS): the others, then the goal, as seen from the ball."""
-        others = others_of(geometry)
+        others, geometry = inputs.others, inputs.geometry
         ball = torch.cat(geometry_of(geometry, "ball_x", "ball_y"), 1)
         decay = geometry_of(geometry, "ball_decay")[0][..., None]
         goal = torch.zeros_like(others[:, :1])

@@ -25,7 +25,7 @@ from teamclone.models.heads.kick import (
     Kicks,
 )
 from teamclone.models.heads.mixture import TACKLE_DIRECTIONS, MixtureHead, class_of
-from teamclone.models.inputs.geometry import GEOMETRY, MATES
+from teamclone.models.inputs.geometry import GEOMETRY, MATES, InputLayout, Inputs
 from teamclone.models.inputs.planned import plans
 from teamclone.planner.plan import PLAN, WAYS
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
@@ -39,12 +39,13 @@ USUAL = 1 / (1 + math.exp(-3))
 OUTPUTS = ("share", "ahead", "aside", "speed", "power", "direction")
 
 
-def geometry(**values: float) -> torch.Tensor:
+def geometry(**values: float) -> Inputs:
     """One situation: the player at (10, -5) faces +y; the ball lies at (10, -4), unmoving; mates are where he is."""
     usual = {"x": 10, "y": -5, "cos": 0, "sin": 1, "decay": 0.4, "dash_gain": 0.006, "ball_x": 10, "ball_y": -4}
     usual |= {"kick_gain": 0.02, "ball_decay": 0.94, "ball_speed_max": 3.0}
     usual |= {f"mate_{mate}_{axis}": usual[axis] for mate in range(MATES) for axis in "xy"}
-    return torch.tensor([[float((usual | values).get(name, 0.0)) for name in GEOMETRY]])
+    columns = torch.tensor([[float((usual | values).get(name, 0.0)) for name in GEOMETRY]])
+    return InputLayout(columns=0, others=False, plan=False).unpack(columns)
 
 
 def kick(*, component: int = 0, outputs: dict[str, float] | None = None, **values: float) -> list[float]:
@@ -60,10 +61,10 @@ def kick(*, component: int = 0, outputs: dict[str, float] | None = None, **value
     return [float(power.centre[0, component]), float(direction.centre[0, component]) / DEGREE]
 
 
-def planned(ways: dict[str, tuple[float, float]]) -> torch.Tensor:
+def planned(ways: dict[str, tuple[float, float]]) -> Inputs:
     """The same situation with ways to go on, and the velocities that they give the ball."""
     columns = [[1.0, *ways[name]] if name in ways else [0.0, 0.0, 0.0] for name in WAYS]
-    return torch.cat([geometry(ball_vx=0.3, ball_vy=-0.2), torch.tensor(columns).view(1, -1)], 1)
+    return geometry(ball_vx=0.3, ball_vy=-0.2)._replace(ways=torch.tensor([columns]))
 
 
 def needed(wanted: Sequence[float], *, gain: float = 0.02, motion: Sequence[float] = (0.0, 0.0)) -> list[float]:

@@ -7,10 +7,9 @@ import math
 import pytest
 import torch
 from tests.situations import situations
-from torch import Tensor
 
 from teamclone.models.inputs.egocentric import EgocentricFeatures
-from teamclone.models.inputs.geometry import GEOMETRY, MATES, OTHER, OTHERS, others_of
+from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, Inputs
 from teamclone.models.layers.players import PLAYER_COLUMNS, RUN_SPEED, TARGETS, PlayerEncoder
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
 from teamclone.world.state import State
@@ -18,18 +17,18 @@ from teamclone.world.state import State
 FEATURES = EgocentricFeatures(("ball",), others=True)
 
 
-def geometry_of(state: State) -> Tensor:
-    return FEATURES.project(state)[:, FEATURES.n_inputs :]
+def inputs_of(state: State) -> Inputs:
+    return FEATURES.layout.unpack(FEATURES.project(state))
 
 
-def placed(ball: tuple[float, float], mates: list[tuple[float, float]], opponents: list[tuple[float, float]]) -> Tensor:
-    """The geometry of one situation in which only these are on the field beside the actor, who has the ball."""
+def placed(ball: tuple[float, float], mates: list[tuple[float, float]], opponents: list[tuple[float, float]]) -> Inputs:
+    """The inputs of one situation in which only these are on the field beside the actor, who has the ball."""
     state = situations(1)
     players, actor = torch.zeros_like(state.players), 10
     for slot, (x, y) in [*enumerate(mates), (actor, ball), *enumerate(opponents, 11)]:
         players[0, slot, CHANNEL["x"]], players[0, slot, CHANNEL["y"]] = x, y
         players[0, slot, CHANNEL["flags"]] = FLAG_ON_FIELD
-    return geometry_of(
+    return inputs_of(
         State.now(
             ball=torch.tensor([[*ball, 0.0, 0.0]]), players=players, types=state.types, actor=torch.tensor([actor])
         )
@@ -38,7 +37,7 @@ def placed(ball: tuple[float, float], mates: list[tuple[float, float]], opponent
 
 def test_the_others_are_the_players_of_the_state() -> None:
     state = situations(20)
-    others = others_of(geometry_of(state))
+    others = inputs_of(state).others
     assert others.shape == (20, OTHERS, len(OTHER))
     for row, (actor, players) in enumerate(zip(state.actor.tolist(), state.players, strict=True)):
         distance = (players[:, :2] - players[actor, :2]).norm(dim=1)
@@ -52,24 +51,24 @@ def test_the_others_are_the_players_of_the_state() -> None:
 
 
 def test_who_is_not_there_is_all_zeros() -> None:
-    others = others_of(placed((0, 0), [(10, 0)], [(20, 0), (30, 0)]))[0]
+    others = placed((0, 0), [(10, 0)], [(20, 0), (30, 0)]).others[0]
     there = others[:, OTHER.index("there")]
     assert there.tolist() == [1.0] + [0.0] * 9 + [1.0, 1.0] + [0.0] * 9
     assert others[there == 0].abs().max() == 0
 
 
-def crowd(width: int = 8) -> PlayerEncoder:
+def encoder(width: int = 8) -> PlayerEncoder:
     torch.manual_seed(0)
     return PlayerEncoder(width, 3)
 
 
 def test_the_order_of_the_others_means_nothing() -> None:
-    geometry, situation = geometry_of(situations(30)), torch.rand(30, 3)
+    inputs, situation = inputs_of(situations(30)), torch.rand(30, 3)
     mates, opponents = torch.randperm(MATES), torch.randperm(OTHERS - MATES)
     order = torch.cat([mates, MATES + opponents])
-    turned = torch.cat([geometry[:, : len(GEOMETRY)], others_of(geometry)[:, order].flatten(1)], 1)
-    model = crowd()
-    (together, targets), (other_together, other_targets) = (model(situation, of) for of in (geometry, turned))
+    turned = inputs._replace(others=inputs.others[:, order])
+    model = encoder()
+    (together, targets), (other_together, other_targets) = (model(situation, of) for of in (inputs, turned))
     torch.testing.assert_close(other_together, together)
     torch.testing.assert_close(other_targets[:, :MATES], targets[:, mates])
     torch.testing.assert_close(other_targets[:, MATES:], targets[:, MATES:])
@@ -77,26 +76,27 @@ def test_the_order_of_the_others_means_nothing() -> None:
 
 
 def test_each_hangs_on_all_others_and_on_the_situation() -> None:
-    geometry = geometry_of(situations(5)).detach().requires_grad_()
+    inputs = inputs_of(situations(5))
+    others = inputs.others.clone().requires_grad_()
     situation = torch.rand(5, 3, requires_grad=True)
-    _, targets = crowd()(situation, geometry)
+    _, targets = encoder()(situation, inputs._replace(others=others))
     # Of what is normalised the plain sum hangs on nothing.
     some = (targets * torch.arange(8.0)).sum(2)
     for target in range(TARGETS):
-        of_geometry, of_situation = torch.autograd.grad(some[:, target].sum(), (geometry, situation), retain_graph=True)
-        assert (others_of(of_geometry).abs().amax((0, 2)) > 1e-4).all()
+        of_others, of_situation = torch.autograd.grad(some[:, target].sum(), (others, situation), retain_graph=True)
+        assert (of_others.abs().amax((0, 2)) > 1e-4).all()
         assert (of_situation.abs().amax(0) > 1e-4).all()
 
 
 def test_no_situation_at_all_is_answered() -> None:
-    together, targets = crowd()(torch.zeros(0, 3), geometry_of(situations(2))[:0])
+    together, targets = encoder()(torch.zeros(0, 3), inputs_of(situations(2).select(slice(0, 0))))
     assert together.shape == (0, 8)
     assert targets.shape == (0, TARGETS, 8)
 
 
 def lane(mate: tuple[float, float], *opponents: tuple[float, float]) -> list[float]:
     """Of the kick from (10, 5) to a team mate: radians, cycles, metres to the nearest opponent, metres."""
-    columns = crowd().columns(placed((10, 5), [mate], list(opponents)))
+    columns = encoder().columns(placed((10, 5), [mate], list(opponents)))
     assert columns.shape == (1, OTHERS + 1, PLAYER_COLUMNS)
     angle, ahead, nearest, distance = columns[0, 0, -4:].tolist()
     return [angle, 10 * ahead, 10 * nearest, 20 * distance]
@@ -118,7 +118,7 @@ def test_the_opponent_nearest_to_a_lane_counts() -> None:
 
 
 def test_the_goal_is_among_them() -> None:
-    columns = crowd().columns(placed((10, 5), [(30, 5)], []))[0]
+    columns = encoder().columns(placed((10, 5), [(30, 5)], []))[0]
     assert columns[OTHERS, :2].tolist() == pytest.approx([42.5 / 20, -5 / 20])
     assert columns[:, OTHER.index("there") + 3].tolist() == [1.0] + [0.0] * 20 + [1.0]
     assert columns[:, -6:-4].tolist() == [[0, 0]] * MATES + [[1, 0]] * (OTHERS - MATES) + [[0, 1]]

@@ -57,6 +57,8 @@ PLACES = sum(COUNTS)
 PLACE_PART = np.repeat(RING_PARTS, COUNTS)
 PLACE_DEG = np.concatenate([360.0 / count * np.arange(count) - 180.0 for count in COUNTS])
 """(PLACES,) of each place the ring and the degrees from the body."""
+SINGLES = np.stack([np.arange(PLACES)] * 2, axis=1)
+"""(PLACES, 2) each place as the pair of two kicks, which is one place."""
 OFF_M, WITHIN_M = 0.1, 0.2
 """Metres by which a place is at least beyond touch, and within reach."""
 DIRECTIONS, PAIRS = 72, 1024
@@ -78,7 +80,7 @@ LOST, TACKLED, SOON_TACKLED, SOON_LOST, CUT_OFF, MAYBE_CUT_OFF, OUTSIDE, MISSED 
 """Perils of a ball in a place, of one that is kicked on from there, and of the way to it."""
 NEVER = OUTSIDE | LOST | CUT_OFF
 RISKS = TACKLED | SOON_TACKLED | SOON_LOST | MAYBE_CUT_OFF
-"""What excludes a sequence; and what does so as long as there is one without."""
+"""Perils that exclude a sequence; and those that do so as long as one without them is fast enough."""
 _PRICES = {TACKLED: 0.5, SOON_TACKLED: 0.3, SOON_LOST: 0.6, MAYBE_CUT_OFF: 0.25, MISSED: 0.03}
 _LESS = {MAYBE_CUT_OFF: 0.05}
 """What perils take of a sequence's worth, and what of that several kicks are spared."""
@@ -276,7 +278,9 @@ def _comes(server: Array, stages: Stages, kicks: int, first: int, last: int) -> 
 
 
 @kernel
-def _last_kick(server: Array, place: Array, gain: float, came: tuple[float, float], target: Target) -> tuple[float, float]:
+def _last_kick(
+    server: Array, place: Array, gain: float, came: tuple[float, float], target: Target
+) -> tuple[float, float]:
     """Return the speed towards the target that a kick gives, at most the wanted one, and its power.
 
     Args:
@@ -301,56 +305,89 @@ def _worth(target: Target, kicks: int, speed: float, power: float, perils: int) 
     return 1.0 - slow - hard - KICKS_PRICE[kicks - 1] - PRICE[int(several), perils] - POWER_PRICE * power
 
 
+class Table(NamedTuple):
+    """Sequences of kicks that may be chosen.
+
+    Attributes:
+        speed: (n,) metres per cycle that the last kick gives. worth: (n,) see `_worth`.
+        first: (n,) place to which the first kick brings the ball; -1 of one that goes to the target.
+    """
+
+    speed: Array
+    worth: Array
+    first: Ints
+
+
+@kernel
+def _add(
+    scene: Array, stages: Stages, target: Target, kicks: int, pairs: Ints, barred: int, table: Table, count: int
+) -> int:
+    """Add sequences of 2 or 3 kicks to a table, and return how many it has then.
+
+    Of those that fall short only ever faster ones are added, and none of three kicks once the wanted speed is reached.
+    Each takes the row of the sequence before it, but for the first of two kicks.
+
+    Args:
+        pairs: (n, 2) places after the first kick and before the last; of two kicks one place, twice.
+        barred: perils that exclude a place. count: rows of the table that are filled.
+    """
+    server = scene[SERVER]
+    begun = (stages.lies[0, 0] | stages.rolls[0, 0]) & ~CUT_OFF
+    enough = ENOUGH if kicks == 3 else PLACES
+    full, fastest_short, way = 0, 0.0, 0
+    while way < len(pairs) and full < enough:
+        first, last = pairs[way]
+        way += 1
+        perils = stages.lies[kicks - 1, last] | stages.rolls[kicks - 1, last]
+        if kicks == 3:
+            perils |= stages.lies[1, first] | (stages.rolls[1, first] & ~CUT_OFF)
+        if not stages.opens[first] or perils & barred:
+            continue
+        possible, vx, vy = _comes(server, stages, kicks, first, last)
+        if not possible:
+            continue
+        gain = stages.gain[kicks - 1, last]
+        speed, power = _last_kick(server, stages.place[kicks - 1, last], gain, (vx, vy), target)
+        short = speed < target.speed
+        if short and (speed <= fastest_short or (kicks == 3 and full > 0)):
+            continue
+        missed = not short and stages.missed[first] > -ROOM_M[kicks - 2]
+        row = max(0, count - 1) if short and (kicks == 3 or fastest_short > 0.0) else count
+        full, fastest_short = full + (not short), speed if short else fastest_short
+        table.speed[row], table.first[row] = speed, first
+        table.worth[row] = _worth(target, kicks, speed, power, perils | begun | MISSED * missed)
+        count = row + 1
+    return count
+
+
 @kernel
 def best_sequence(scene: Array, order: Ints, target: Target, most: int) -> tuple[float, float, float]:
     """Return the speed that the best of all sequences gives the ball, and its velocity after the first kick.
 
-    All in metres per cycle, all 0 where no sequence is possible.
+    All in metres per cycle, all 0 where no sequence is possible. Risks are taken only where nothing else is fast enough.
 
     Args:
         order: see `kick_order`. most: kicks, 1 or 3.
     """
-    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
+    me, ball = scene[ACTOR], scene[BALL]
     stages = _stages(scene, target, most)
-    rows = 1 if most == 1 else 1 + PLACES + PAIRS
-    speed, worth, opening = np.empty(rows), np.empty(rows), np.empty(rows, np.int64)
-    risky = np.zeros(rows, np.bool_)
-
-    count, begun = 0, stages.lies[0, 0] | stages.rolls[0, 0]
-    direct, power = _last_kick(server, stages.place[0, 0], ball[GAIN], (ball[VX], ball[VY]), target)
-    if not begun & CUT_OFF:
-        speed[0], worth[0], opening[0] = direct, _worth(target, 1, direct, power, begun), -1
-        count = 1
+    most_rows = 1 if most == 1 else 1 + 2 * (PLACES + PAIRS)
+    table = Table(np.empty(most_rows), np.empty(most_rows), np.empty(most_rows, np.int64))
+    speed, power = _last_kick(scene[SERVER], stages.place[0, 0], ball[GAIN], (ball[VX], ball[VY]), target)
+    perils = stages.lies[0, 0] | stages.rolls[0, 0]
+    table.speed[0], table.worth[0], table.first[0] = speed, _worth(target, 1, speed, power, perils), -1
+    count = 0 if perils & CUT_OFF else 1
     facing = turned(direction(target.x - me[X], target.y - me[Y]) - me[BODY])
     pairs = order[int(np.rint(DIRECTIONS * (facing + 180.0) / 360.0)) % DIRECTIONS]
-    for kicks in range(2, most + 1):
-        full_safe, full_risky = 0, 0
-        for way in range(PLACES if kicks == 2 else PAIRS):
-            first, last = (way, way) if kicks == 2 else (pairs[way, 0], pairs[way, 1])
-            perils = stages.lies[kicks - 1, last] | stages.rolls[kicks - 1, last]
-            if kicks == 3:
-                perils |= stages.lies[1, first] | (stages.rolls[1, first] & ~CUT_OFF)
-            is_risky = perils & RISKS != 0
-            done = (full_risky if is_risky else full_safe) >= (ENOUGH if kicks == 3 else PLACES)
-            possible, vx, vy = _comes(server, stages, kicks, first, last)
-            if done or perils & NEVER or not possible:
-                continue
-            given, power = _last_kick(server, stages.place[kicks - 1, last], stages.gain[kicks - 1, last], (vx, vy), target)
-            full = given >= target.speed
-            full_risky, full_safe = full_risky + (full & is_risky), full_safe + (full & (not is_risky))
-            perils |= (begun & ~CUT_OFF) | (MISSED if stages.missed[first] > -ROOM_M[kicks - 2] else 0)
-            speed[count], worth[count] = given, _worth(target, kicks, given, power, perils)
-            opening[count], risky[count] = first, is_risky
-            count += 1
+    for barred in (NEVER | RISKS, NEVER):
+        if most > 1 and (barred & RISKS or not (table.speed[:count] > target.enough).any()):
+            count = _add(scene, stages, target, 2, SINGLES, barred, table, count)
+            count = _add(scene, stages, target, 3, pairs, barred, table, count)
     if count == 0:
         return 0.0, 0.0, 0.0
-    # Risks are taken only where nothing else is fast enough.
-    speed, worth, opening, risky = speed[:count], worth[:count], opening[:count], risky[:count]
-    if (speed[~risky] > target.enough).any():
-        worth[risky] = -np.inf
-    chosen = np.argmax(worth)
-    if opening[chosen] >= 0:
-        return speed[chosen], stages.sent[opening[chosen], 0], stages.sent[opening[chosen], 1]
-    metres = gap(target.x, target.y, ball[X], ball[Y])
-    part = speed[chosen] / metres
-    return speed[chosen], part * (target.x - ball[X]), part * (target.y - ball[Y])
+    chosen = np.argmax(table.worth[:count])
+    speed, first = table.speed[chosen], table.first[chosen]
+    if first >= 0:
+        return speed, stages.sent[first, 0], stages.sent[first, 1]
+    part = speed / gap(target.x, target.y, ball[X], ball[Y])
+    return speed, part * (target.x - ball[X]), part * (target.y - ball[Y])

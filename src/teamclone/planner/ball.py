@@ -117,7 +117,7 @@ def fastest_from(scene: Array, cos: float, sin: float, gain: float) -> float:
 
 @kernel
 def kick_noise(scene: Array) -> float:
-    """Return the metres per cycle by which a kick of the actor at full power may miss (rcssserver `player.cpp`, kick)."""
+    """Return the metres per cycle by which a kick at full power may miss (rcssserver `player.cpp`, kick)."""
     me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
     x, y = ball[X] - me[X], ball[Y] - me[Y]
     off = abs(turned(direction(x, y) - me[BODY])) / 180.0

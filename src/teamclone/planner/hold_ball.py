@@ -50,7 +50,7 @@ RING_PARTS, AROUND = (0.4, 0.6, 0.75), 20
 """Rings around the player, parts of the margin, and how many places on each, evenly, the first towards -x."""
 _AROUND_DEG = np.repeat(360.0 / AROUND * np.arange(AROUND) - 180.0, len(RING_PARTS))
 _PARTS = np.tile(RING_PARTS, AROUND)
-_IS_INNER = _PARTS == RING_PARTS[0]
+_IS_INNER = np.isin(_PARTS, RING_PARTS[0])
 N_AROUND = AROUND * len(RING_PARTS)
 ROLL_ON, AHEAD, STOP, CANDIDATES = N_AROUND, N_AROUND + 1, N_AROUND + 2, N_AROUND + 3
 """Rows of the candidates after the places around: no kick, a kick to just ahead of the body, a stop; their number."""

@@ -101,7 +101,7 @@ at all and per metre per cycle."""
 
 
 class Target(NamedTuple):
-    """Where the ball is to go, metres on the pitch, with what speed, and above which one it will do, metres per cycle."""
+    """Where the ball is to go, metres, with what speed, and above which one it will do, metres per cycle."""
 
     x: float
     y: float
@@ -311,26 +311,37 @@ class Table(NamedTuple):
     Attributes:
         speed: (n,) metres per cycle that the last kick gives. worth: (n,) see `_worth`.
         first: (n,) place to which the first kick brings the ball; -1 of one that goes to the target.
+        filled: (1,) rows that are filled.
     """
 
     speed: Array
     worth: Array
     first: Ints
+    filled: Ints
+
+
+class Search(NamedTuple):
+    """Sequences that are to be tried.
+
+    Attributes:
+        kicks: 2 or 3. barred: perils that exclude a place.
+        pairs: (n, 2) places after the first kick and before the last; of two kicks one place, twice.
+    """
+
+    kicks: int
+    barred: int
+    pairs: Ints
 
 
 @kernel
-def _add(
-    scene: Array, stages: Stages, target: Target, kicks: int, pairs: Ints, barred: int, table: Table, count: int
-) -> int:
-    """Add sequences of 2 or 3 kicks to a table, and return how many it has then.
+def _add(scene: Array, stages: Stages, target: Target, search: Search, table: Table) -> None:
+    """Add the possible sequences of a search to a table.
 
     Of those that fall short only ever faster ones are added, and none of three kicks once the wanted speed is reached.
     Each takes the row of the sequence before it, but for the first of two kicks.
-
-    Args:
-        pairs: (n, 2) places after the first kick and before the last; of two kicks one place, twice.
-        barred: perils that exclude a place. count: rows of the table that are filled.
     """
+    kicks, barred, pairs = search
+    count = table.filled[0]
     server = scene[SERVER]
     begun = (stages.lies[0, 0] | stages.rolls[0, 0]) & ~CUT_OFF
     enough = ENOUGH if kicks == 3 else PLACES
@@ -357,14 +368,15 @@ def _add(
         table.speed[row], table.first[row] = speed, first
         table.worth[row] = _worth(target, kicks, speed, power, perils | begun | MISSED * missed)
         count = row + 1
-    return count
+    table.filled[0] = count
 
 
 @kernel
 def best_sequence(scene: Array, order: Ints, target: Target, most: int) -> tuple[float, float, float]:
     """Return the speed that the best of all sequences gives the ball, and its velocity after the first kick.
 
-    All in metres per cycle, all 0 where no sequence is possible. Risks are taken only where nothing else is fast enough.
+    All in metres per cycle, all 0 where no sequence is possible. Risks are taken only where nothing else is fast
+    enough.
 
     Args:
         order: see `kick_order`. most: kicks, 1 or 3.
@@ -372,17 +384,18 @@ def best_sequence(scene: Array, order: Ints, target: Target, most: int) -> tuple
     me, ball = scene[ACTOR], scene[BALL]
     stages = _stages(scene, target, most)
     most_rows = 1 if most == 1 else 1 + 2 * (PLACES + PAIRS)
-    table = Table(np.empty(most_rows), np.empty(most_rows), np.empty(most_rows, np.int64))
+    table = Table(np.empty(most_rows), np.empty(most_rows), np.empty(most_rows, np.int64), np.zeros(1, np.int64))
     speed, power = _last_kick(scene[SERVER], stages.place[0, 0], ball[GAIN], (ball[VX], ball[VY]), target)
     perils = stages.lies[0, 0] | stages.rolls[0, 0]
     table.speed[0], table.worth[0], table.first[0] = speed, _worth(target, 1, speed, power, perils), -1
-    count = 0 if perils & CUT_OFF else 1
+    table.filled[0] = 0 if perils & CUT_OFF else 1
     facing = turned(direction(target.x - me[X], target.y - me[Y]) - me[BODY])
     pairs = order[int(np.rint(DIRECTIONS * (facing + 180.0) / 360.0)) % DIRECTIONS]
     for barred in (NEVER | RISKS, NEVER):
-        if most > 1 and (barred & RISKS or not (table.speed[:count] > target.enough).any()):
-            count = _add(scene, stages, target, 2, SINGLES, barred, table, count)
-            count = _add(scene, stages, target, 3, pairs, barred, table, count)
+        if most > 1 and (barred & RISKS or not (table.speed[: table.filled[0]] > target.enough).any()):
+            _add(scene, stages, target, Search(2, barred, SINGLES), table)
+            _add(scene, stages, target, Search(3, barred, pairs), table)
+    count = table.filled[0]
     if count == 0:
         return 0.0, 0.0, 0.0
     chosen = np.argmax(table.worth[:count])

@@ -145,8 +145,8 @@ def rested(random: Random) -> tuple[object, object]:
     ]
 
 
-FORMULAS = (kick_rate, kickable_area, dash_rate, limited, fastest, turn, turns, tackle_failure, tackle_power, roll, inertia_point,
-            cycles_over, dashes, rested)  # fmt: skip
+FORMULAS = (kick_rate, kickable_area, dash_rate, limited, fastest, turn, turns, tackle_failure, tackle_power, roll,
+            inertia_point, cycles_over, dashes, rested)  # fmt: skip
 
 
 @pytest.mark.parametrize("both", FORMULAS, ids=lambda both: both.__name__)

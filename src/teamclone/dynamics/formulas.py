@@ -127,6 +127,31 @@ def kicked(
     return limited(velocity[0] + x, velocity[1] + y, ball_speed_max)
 
 
+def fastest(
+    velocity: tuple[Value, Value],
+    toward: tuple[Value, Value],
+    *,
+    most_added: Value,
+    ball_speed_max: Value,
+) -> Value:
+    """Greatest speed in a direction that one kick gives the ball, 0 if it cannot go there.
+
+    The velocities that a kick can give fill a disc around the velocity before. The ray in the direction leaves it with
+    the greatest speed.
+
+    Args:
+        velocity: of the ball before.
+        toward: unit vector.
+        most_added: by how much the kick changes the velocity at most.
+    """
+    middle = velocity[0] * toward[0] + velocity[1] * toward[1]
+    off = velocity[1] * toward[0] - velocity[0] * toward[1]
+    xp = _of(middle, most_added)
+    half = xp.sqrt(xp.clip(most_added**2 - off**2, 0.0, None))
+    meets = (abs(off) <= most_added) & (middle - half <= ball_speed_max)
+    return xp.where(meets, xp.clip(middle + half, 0.0, ball_speed_max), 0.0)
+
+
 def dash_rate(direction_deg: Value, *, side_dash_rate: Value, back_dash_rate: Value) -> Value:
     """Return the share of a dash's power that a direction leaves (``player.cpp``, dash).
 

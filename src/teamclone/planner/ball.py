@@ -6,12 +6,19 @@ import math
 from typing import NamedTuple
 
 from teamclone.planner.scene import (
+    ACTOR,
     BALL,
     BALL_ACCEL_MAX,
+    BALL_DECAY,
+    BALL_RAND,
     BALL_SPEED_MAX,
+    BODY,
+    GAIN,
+    KICK_RAND,
     KICK_RATE,
     MARGIN,
     MAX_POWER,
+    PLAYER_RAND,
     ROLL,
     SERVER,
     TOUCH,
@@ -20,6 +27,8 @@ from teamclone.planner.scene import (
     Array,
     X,
     Y,
+    direction,
+    gap,
     kernel,
     roll,
     turned,
@@ -78,7 +87,7 @@ def most_acceleration(server: Array, gain: float) -> float:
 def fastest(limits: tuple[float, float], toward: tuple[float, float], velocity: tuple[float, float]) -> float:
     """Return the greatest speed in a direction that one kick gives a ball with this velocity; 0 if it cannot go there.
 
-    Velocities after a kick fill a disc around the velocity before: the speed is that where the ray leaves the disc.
+    `dynamics.formulas.fastest`.
 
     Args:
         limits: by how much the kick changes the velocity at most, and the ball's speed at most. toward: unit vector.
@@ -104,3 +113,45 @@ def kick_limits(server: Array, gain: float) -> tuple[float, float]:
 def fastest_from(scene: Array, cos: float, sin: float, gain: float) -> float:
     """Return `fastest` of the ball of a scene."""
     return fastest(kick_limits(scene[SERVER], gain), (cos, sin), (scene[BALL, VX], scene[BALL, VY]))
+
+
+@kernel
+def kick_noise(scene: Array) -> float:
+    """Return the metres per cycle by which a kick at full power may miss (rcssserver `player.cpp`, kick)."""
+    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
+    x, y = ball[X] - me[X], ball[Y] - me[Y]
+    off = abs(turned(direction(x, y) - me[BODY])) / 180.0
+    far = (math.hypot(x, y) - me[TOUCH]) / me[MARGIN]
+    fast = math.hypot(ball[VX], ball[VY]) / (server[BALL_SPEED_MAX] * server[BALL_DECAY])
+    return me[KICK_RAND] * (1.0 + 0.25 * (off + far) + 0.5 * fast)
+
+
+@kernel
+def aim_error(scene: Array, noise: float, metres: float, added: float) -> float:
+    """Return the metres by which the ball may be off where the actor wants it, seen from itself, in the next cycle.
+
+    Args:
+        noise: see `kick_noise`. metres: that the ball covers. added: metres per cycle by which the kick changes the
+            ball's velocity, 0 for no kick.
+    """
+    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
+    moves = math.hypot(me[VX], me[VY]) * server[PLAYER_RAND] + metres * server[BALL_RAND]
+    return moves + noise * added / (ball[GAIN] * server[MAX_POWER])
+
+
+@kernel
+def kick_to(ball: Array, place: tuple[float, float]) -> tuple[float, float, float]:
+    """Return the velocity that has the ball in a place in the next cycle, and by how much it differs from the present.
+
+    All in metres per cycle.
+    """
+    vx, vy = place[0] - ball[X], place[1] - ball[Y]
+    return vx, vy, gap(vx, vy, ball[VX], ball[VY])
+
+
+@kernel
+def limited(x: float, y: float, most: float) -> tuple[float, float]:
+    """Return a vector with its length cut to ``most``; `dynamics.formulas.limited`."""
+    length = math.hypot(x, y)
+    part = most / length if length > most else 1.0
+    return x * part, y * part

@@ -1,23 +1,27 @@
-"""A kick that takes several: to which place beside him he brings the ball first, to be able to kick it on."""
+"""Kicks towards a place: one, or several that first bring the ball to where the last one is harder.
+
+A sequence is a way through stages: the ball where it is, then up to two places around the player, one for each kick
+before the last. All sequences are one table: the speed they give, the power of the last kick, and the perils on their
+way. The one that is worth most is chosen.
+"""
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.planner.ball import fastest, fastest_from, kick_limits, kick_rate, most_acceleration
-from teamclone.planner.hold_ball import kick_noise
-from teamclone.planner.players import after_dash, reach_of, seen_from, tackle_chance
+from teamclone.dynamics import formulas
+from teamclone.planner.ball import aim_error, fastest, kick_limits, kick_noise, kick_rate, kick_to, most_acceleration
+from teamclone.planner.motion import beside
+from teamclone.planner.players import Bearing, bearing, pose_after, tackle_chance
 from teamclone.planner.scene import (
     ACTOR,
     AREA,
     BALL,
     BALL_DECAY,
-    BALL_RAND,
     BODY,
     DASH_ACCEL,
     FOUL_EXPONENT,
@@ -26,9 +30,7 @@ from teamclone.planner.scene import (
     GOAL_X,
     LINE_Y,
     MARGIN,
-    MAX_POWER,
     OPPONENT,
-    PLAYER_RAND,
     SERVER,
     TACKLE_DIST,
     TACKLE_EXPONENT,
@@ -41,76 +43,65 @@ from teamclone.planner.scene import (
     Y,
     direction,
     gap,
-    inertia_point,
     kernel,
     turned,
 )
 from teamclone.rcss.player_types import DEFAULTS
-from teamclone.rcss.server_params import default
+from teamclone.rcss.server_params import SERVER_FIELD
 
-RINGS, COUNTS = (0.3, 0.5, 0.7), (12, 15, 20)
-"""Places around the body: parts of the margin, and how many on each ring."""
+Ints = NDArray[np.int64]
+
+RING_PARTS, COUNTS = (0.3, 0.5, 0.7), (12, 15, 20)
+"""Rings around the player, parts of the margin, and how many places on each, evenly, the first right behind."""
 PLACES = sum(COUNTS)
+PLACE_PART = np.repeat(RING_PARTS, COUNTS)
+PLACE_DEG = np.concatenate([360.0 / count * np.arange(count) - 180.0 for count in COUNTS])
+"""(PLACES,) of each place the ring and the degrees from the body."""
+SINGLES = np.stack([np.arange(PLACES)] * 2, axis=1)
+"""(PLACES, 2) each place as the pair of two kicks, which is one place."""
 OFF_M, WITHIN_M = 0.1, 0.2
-"""How far a place is at least off his edge, and within his reach."""
-DIRECTIONS, PATHS = 72, 1024
-"""Of kicks, and pairs of places before them that are tried, those first that give the ball most speed."""
-LOST, TACKLED, SOON_TACKLED, SOON_LOST, CUT_OFF, MAYBE_CUT_OFF, OUTSIDE, MISSED = (1 << bit for bit in range(8))
-"""What may happen to a ball in a place, or kicked on from there."""
-PRICES = 0.0, 0.5, 0.3, 0.6, 0.0, 0.25, 0.0, 0.03
-"""What each of them takes of a sequence's worth, in their order."""
-TOO_SLOW, SLOWER, SHORT = -10.0, 100.0, 0.05
-"""Worth of a sequence that is too slow, and less for each metre per cycle; what one kick loses that is slow enough."""
-MORE_KICKS, HARD, HARDEST, POWER, SECURED = (0.05, 0.2), (90.0, 0.025), (94.0, 0.075), 0.0005, 0.05
-"""What two and three kicks lose; a last kick above a power; each unit of it; by how much less several kicks mind that
-the ball may be cut off."""
-RISKS = TACKLED | SOON_TACKLED | SOON_LOST | MAYBE_CUT_OFF | MISSED
+"""Metres by which a place is at least beyond touch, and within reach."""
+DIRECTIONS, PAIRS = 72, 1024
+"""Directions of the last kick of three, and how many pairs of places before it are tried."""
+ORDER_FIELDS = tuple(SERVER_FIELD[name] for name in ("ball_size", "maxpower", "ball_accel_max", "ball_speed_max"))
+"""Columns of the server that `kick_order` goes by."""
+THIN_M, ALIKE = 0.1, 1e-3
+"""Metres by which the rings of the order have a smaller margin; speeds so near to each other count as one there."""
+SECOND_PART = 0.9
+"""Part of a place's kick rate that the second of three kicks is planned with."""
+ROOM_M = 0.05, 0.1
+"""Metres that the error of the first of two and of three kicks leaves within reach; else the ball may be missed."""
+ENOUGH = 11
+"""Sequences of three kicks with the wanted speed after which no more are tried."""
+
 NEAR_M = 10.0
-"""Opponents further from the ball are not looked at."""
-ENOUGH = 10
-"""Paths of three kicks after which no more are looked for."""
-MOST = 2 * (PLACES + PATHS) + 1
-
-
-def kick_order() -> NDArray[np.int64]:
-    """(DIRECTIONS, PATHS, 2) first and second place before a kick in each direction from the body, for a player of the
-    default type, the pairs first that give the ball most speed."""
-    size, margin = DEFAULTS["player_size"] + default("ball_size"), DEFAULTS["kickable_margin"]
-    thin = margin - 0.1  # the smallest that the server gives
-    places, rates = [], []
-    power_max, accel_max, speed_max = (default(name) for name in ("maxpower", "ball_accel_max", "ball_speed_max"))
-    for part, count in zip(RINGS, COUNTS, strict=True):
-        radius = min(max(size + OFF_M, size + thin * part), size + margin - WITHIN_M)
-        for place in range(count):
-            degrees = 360.0 / count * place - 180.0
-            angle = math.radians(degrees)
-            places.append((radius * math.cos(angle), radius * math.sin(angle)))
-            rate = 1 - 0.25 * abs(degrees) / 180.0 - 0.25 * (radius - size) / margin
-            rates.append(DEFAULTS["kick_power_rate"] * rate)
-
-    def order(one: tuple[float, float, int, int], other: tuple[float, float, int, int]) -> int:
-        # Speeds that differ by less than this count as one, so this is no order that a key would give.
-        more = one[1] - other[1] if abs(one[0] - other[0]) < 1e-3 else other[0] - one[0]
-        return (more > 0) - (more < 0)
-
-    made = np.empty((DIRECTIONS, PATHS, 2), np.int64)
-    for turn in range(DIRECTIONS):
-        angle = math.radians(360.0 / DIRECTIONS * turn - 180.0)
-        cos, sin = math.cos(angle), math.sin(angle)
-        pairs = []
-        for first, (from_x, from_y) in enumerate(places):
-            for second, (to_x, to_y) in enumerate(places):
-                vx, vy = to_x - from_x, to_y - from_y
-                speed = fastest.py_func((min(power_max * rates[second], accel_max), speed_max), (cos, sin), (vx, vy))
-                power = math.hypot(speed * cos - vx, speed * sin - vy) / rates[second]
-                pairs.append((speed, power, first, second))
-        pairs.sort(key=functools.cmp_to_key(order))
-        made[turn] = [pair[2:] for pair in pairs[:PATHS]]
-    return made
+"""Opponents further from the ball are ignored."""
+LOST, TACKLED, SOON_TACKLED, SOON_LOST, CUT_OFF, MAYBE_CUT_OFF, OUTSIDE, MISSED = (1 << bit for bit in range(8))
+"""Perils of a ball in a place, of one that is kicked on from there, and of the way to it."""
+NEVER = OUTSIDE | LOST | CUT_OFF
+RISKS = TACKLED | SOON_TACKLED | SOON_LOST | MAYBE_CUT_OFF
+"""Perils that exclude a sequence; and those that do so as long as one without them is fast enough."""
+_PRICES = {TACKLED: 0.5, SOON_TACKLED: 0.3, SOON_LOST: 0.6, MAYBE_CUT_OFF: 0.25, MISSED: 0.03}
+_LESS = {MAYBE_CUT_OFF: 0.05}
+"""What perils take of a sequence's worth, and what of that several kicks are spared."""
+PRICE = np.array(
+    [[sum(cost for peril, cost in _PRICES.items() if perils & peril) for perils in range(256)],
+     [sum(cost - _LESS.get(peril, 0.0) for peril, cost in _PRICES.items() if perils & peril) for perils in range(256)]]
+)  # fmt: skip
+"""(2, 256) what all perils together take, of one kick and of several."""
+KICKS_PRICE = np.array([0.0, 0.05, 0.2])
+"""What the number of kicks takes."""
+HARD_POWERS, HARD_PRICES = np.array([90.0, 94.0]), np.array([0.0, 0.025, 0.075])
+POWER_PRICE = 0.0005
+"""What a last kick of several takes that is above so much power; and what any last kick takes per unit of it."""
+SHORT_PRICE = 0.05
+TOO_SLOW, SLOWER = 11.0, 100.0
+"""What a single kick takes that falls short of the wanted speed but will do; and what falling short takes otherwise,
+at all and per metre per cycle."""
 
 
 class Target(NamedTuple):
-    """Where the ball is to go, with what speed, and above which one it will do."""
+    """Where the ball is to go, metres, with what speed, and above which one it will do, metres per cycle."""
 
     x: float
     y: float
@@ -118,208 +109,298 @@ class Target(NamedTuple):
     enough: float
 
 
-class Danger(NamedTuple):
-    """When an opponent endangers a ball, and what that is called.
+class Alarm(NamedTuple):
+    """How near an opponent has to be to a ball to count as a peril, and what perils these are.
 
     Attributes:
-        touch_m: metres beyond its reach within which an opponent that drifts has the ball.
-        chance: of its tackle, from which on it counts; exponent: column of the server that the tackle goes by.
-        dash: part of its dash that counts; short_m: metres by which it reaches less after a dash.
-        tackle_m: metres by which its tackle after a dash reaches less; behind: whether such a tackle goes back, too.
-        taken, tackled, dashed, dash_tackled: what is found.
+        touch_m: metres beyond its reach within which it has the ball without a dash.
+        dash: part of its full dash that it has. short_m: metres by which its reach is shorter after that.
+        tackle_m: metres by which its tackle is shorter after a dash. tackle_part: part of the tackle's width left then.
+        tackle_back_m: metres behind it up to which it tackles after a dash.
+        chance: of a tackle without a dash, above which it counts. exponent: column of the server for that chance.
+        taken, tackled, dashed, dash_tackled: perils that are found.
     """
 
     touch_m: float
-    chance: float
-    exponent: int
     dash: float
     short_m: float
     tackle_m: float
-    behind: bool
+    tackle_part: float
+    tackle_back_m: float
+    chance: float
+    exponent: int
     taken: int
     tackled: int
     dashed: int
     dash_tackled: int
 
 
-LIES = Danger(0.15, 0.7, FOUL_EXPONENT, 1.0, 0.0, 0.3, False, LOST, TACKLED, SOON_LOST, SOON_TACKLED)
-KICKED_ON = Danger(0.1, 0.8, TACKLE_EXPONENT, 0.8, 0.15, 0.5, True, CUT_OFF, *[MAYBE_CUT_OFF] * 3)
-TACKLE_PART = 0.7
-"""Part of the width of a tackle that counts after a dash."""
+LIES = Alarm(0.15, 1.0, 0.0, 0.3, 0.7, 0.0, 0.7, FOUL_EXPONENT, LOST, TACKLED, SOON_LOST, SOON_TACKLED)
+ROLLS = Alarm(0.1, 0.8, 0.15, 0.5, 0.7, math.inf, 0.8, TACKLE_EXPONENT, CUT_OFF, *[MAYBE_CUT_OFF] * 3)
+"""Of a ball beside the player, and of one that is kicked on."""
 
 
-@kernel
-def _danger(server: Array, player: Array, place: tuple[float, float], cycles: int, of: Danger) -> int:
-    """Return what one opponent does to a ball that is in a place after so many cycles."""
-    ahead, aside = seen_from(player, place, cycles)
-    away = math.hypot(ahead, aside)
-    if player[FROZEN] > 0:
-        return of.taken if away < player[TOUCH] else 0
-    reach, dash_m = reach_of(player, place[0], place[1]), of.dash * player[DASH_ACCEL]
-    if away < reach + of.touch_m:
-        return of.taken
-    found = 0
-    if tackle_chance(server, ahead, aside, server[of.exponent]) > of.chance:
-        found |= of.tackled
-    between = abs(ahead) < dash_m and abs(aside) < reach
-    if between or after_dash(ahead, aside, dash_m) < reach - of.short_m:
-        found |= of.dashed
-    else:
-        near = ahead < dash_m + server[TACKLE_DIST] - of.tackle_m and (of.behind or ahead > 0.0)
-        found |= of.dash_tackled if near and abs(aside) < TACKLE_PART * server[TACKLE_WIDTH] else 0
-    return found
+class Stages(NamedTuple):
+    """Where the ball may be after 0, 1 and 2 kicks; after none there is a single place, the first.
+
+    Attributes:
+        place: (3, PLACES, 2) metres. gain: (3, PLACES) metres per cycle that a unit of power gives a ball there.
+        lies, rolls: (3, PLACES) perils of the ball there, and one cycle after it is kicked on from there.
+        sent: (PLACES, 2) velocity that brings the ball to the places of the first kick, metres per cycle.
+        opens: (PLACES,) whether one kick can give it. missed: (PLACES,) metres by which the ball may then be out of
+            reach.
+    """
+
+    place: Array
+    gain: Array
+    lies: Ints
+    rolls: Ints
+    sent: Array
+    opens: NDArray[np.bool_]
+    missed: Array
 
 
-@kernel
-def _dangers(scene: Array, place: tuple[float, float], cycles: int, of: Danger) -> int:
-    """Return what all opponents near the ball may do to it."""
-    found = 0
-    for opponent in range(OPPONENT, BALL):
-        player = scene[opponent]
-        if gap(player[X], player[Y], scene[BALL, X], scene[BALL, Y]) <= NEAR_M:
-            found |= _danger(scene[SERVER], player, place, cycles, of)
-    return found
+def kick_order(server: tuple[float, ...]) -> Ints:
+    """Return (DIRECTIONS, PAIRS, 2) pairs of places before a kick in each direction from the body.
 
-
-@kernel
-def _kicked_on(place: tuple[float, float], target: Target) -> tuple[float, float]:
-    """Return where a ball is one cycle after it is kicked on from a place."""
-    metres = gap(target.x, target.y, place[0], place[1])
-    way = target.speed / metres
-    return place[0] + way * (target.x - place[0]), place[1] + way * (target.y - place[1])
-
-
-@kernel
-def _places(me: Array, radius: Array, rate: Array, place: Array) -> None:
-    """Fill the places beside him in the next two cycles (2, PLACES, 2), how far off and what a kick there gives."""
-    index = 0
-    for ring in range(len(RINGS)):
-        off = min(max(me[TOUCH] + OFF_M, me[TOUCH] + me[MARGIN] * RINGS[ring]), me[AREA] - WITHIN_M)
-        for turn in range(COUNTS[ring]):
-            degrees = 360.0 / COUNTS[ring] * turn - 180.0
-            angle = math.radians(degrees + me[BODY])
-            radius[index], rate[index] = off, kick_rate(me, off, degrees)
-            for cycle in range(2):
-                x, y = inertia_point(me, cycle + 1)
-                place[cycle, index, 0], place[cycle, index, 1] = x + off * math.cos(angle), y + off * math.sin(angle)
-            index += 1
-
-
-@kernel
-def _judged(target: Target, speed: float, power: float, kicks: int, dangers: int) -> float:
-    """How good a sequence of kicks is, 1 for the best: PRICES of what may happen, of each kick more, and of its last
-    one's power."""
-    short = target.speed - speed
-    if short > 0 and (kicks > 1 or speed < target.enough):
-        value = TOO_SLOW - SLOWER * short
-    else:
-        value = 1.0 - (SHORT if short > 0 else 0.0)
-    for bit in range(len(PRICES)):
-        if dangers & (1 << bit):
-            value -= PRICES[bit]
-    if kicks > 1:
-        value -= MORE_KICKS[kicks - 2] + (HARDEST[1] if power > HARDEST[0] else HARD[1] if power > HARD[0] else 0.0)
-        value += SECURED if dangers & MAYBE_CUT_OFF else 0.0
-    return value - POWER * power
-
-
-@kernel
-def best_sequence(scene: Array, order: NDArray[np.int64], target: Target, most: int) -> tuple[float, float, float]:
-    """The speed that at most ``most`` kicks give the ball towards a place, and its velocity after the first.
+    Those come first from which it is fastest, of a player of the default type with a ball that comes straight from one
+    place to the other; among those that are alike the ones with less power.
 
     Args:
-        order: see `kick_order`.
+        server: the values of ORDER_FIELDS.
     """
-    me, ball, gain, server = scene[ACTOR], scene[BALL], scene[BALL, GAIN], scene[SERVER]
-    to_x, to_y, wanted = target.x, target.y, target.speed
-    radius, rate, place = np.empty(PLACES), np.empty(PLACES), np.empty((2, PLACES, 2))
-    _places(me, radius, rate, place)
-    dangers = np.empty((2, PLACES), np.int64)
-    for cycle in range(2):
-        for index in range(PLACES):
-            x, y = place[cycle, index, 0], place[cycle, index, 1]
-            found = OUTSIDE if abs(x) > GOAL_X or abs(y) > LINE_Y else 0
-            found |= _dangers(scene, (x, y), 1, LIES)
-            dangers[cycle, index] = found | _dangers(scene, _kicked_on((x, y), target), cycle + 2, KICKED_ON)
-    now = _dangers(scene, (ball[X], ball[Y]), 1, LIES)
-    soon = _dangers(scene, _kicked_on((ball[X], ball[Y]), target), 1, KICKED_ON)
-    begun = now | (soon & ~CUT_OFF)
+    ball_size, power, accel_max, speed_max = server
+    touch, margin = DEFAULTS["player_size"] + ball_size, DEFAULTS["kickable_margin"]
+    radius = np.clip(touch + (margin - THIN_M) * PLACE_PART, touch + OFF_M, touch + margin - WITHIN_M)
+    angle = np.radians(PLACE_DEG)
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    rate = formulas.kick_rate(
+        radius,
+        angle,
+        ball_size=ball_size,
+        **{name: DEFAULTS[name] for name in ("kick_power_rate", "player_size", "kickable_margin")},
+    )
+    velocity = (x - x[:, None]).ravel(), (y - y[:, None]).ravel()
+    rate = np.tile(rate, PLACES)
+    toward = np.radians(360.0 / DIRECTIONS * np.arange(DIRECTIONS) - 180.0)[:, None]
+    toward_x, toward_y = np.cos(toward), np.sin(toward)
+    speed = formulas.fastest(
+        velocity, (toward_x, toward_y), most_added=np.minimum(power * rate, accel_max), ball_speed_max=speed_max
+    )
+    spent = np.hypot(speed * toward_x - velocity[0], speed * toward_y - velocity[1]) / rate
+    pairs = np.lexsort((spent, -np.rint(speed / ALIKE)))[:, :PAIRS]
+    return np.stack(np.divmod(pairs, PLACES), axis=-1)
 
-    speeds, powers, velocity = np.empty(MOST), np.empty(MOST), np.empty((MOST, 2))
-    kicks, threats = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
-    count = 0
-    most_added = most_acceleration(server, gain)
-    if not soon & CUT_OFF:
-        metres = math.hypot(to_x - ball[X], to_y - ball[Y])
-        cos, sin = (to_x - ball[X]) / metres, (to_y - ball[Y]) / metres
-        speed = wanted
-        if math.hypot(wanted * cos - ball[VX], wanted * sin - ball[VY]) > most_added:
-            speed = fastest_from(scene, cos, sin, gain)
-        speeds[0], powers[0] = speed, math.hypot(speed * cos - ball[VX], speed * sin - ball[VY]) / gain
-        velocity[0, 0], velocity[0, 1], kicks[0], threats[0] = speed * cos, speed * sin, 1, begun
-        count = 1
-    own_noise, noise = math.hypot(me[VX], me[VY]) * server[PLAYER_RAND], kick_noise(scene)
-    facing = turned(direction(to_x - me[X], to_y - me[Y]) - me[BODY])
-    turn = int(np.rint(DIRECTIONS * (facing + 180.0) / 360.0)) % DIRECTIONS
-    for careless in range(2):
-        if careless and count and speeds[:count].max() > target.enough:
-            break
-        never = OUTSIDE | LOST | CUT_OFF
-        avoided = never if careless else never | RISKS
-        for stage in range(2, most + 1):
-            done, fastest_so_far = 0, 0.0
-            for path in range(PLACES if stage == 2 else PATHS):
-                if stage == 3 and done > ENOUGH:
-                    break
-                first = path if stage == 2 else order[turn, path, 0]
-                last = path if stage == 2 else order[turn, path, 1]
-                cycle = stage - 2
-                if stage == 3 and dangers[0, first] & (avoided & ~CUT_OFF):
-                    continue
-                if dangers[cycle, last] & avoided:
-                    continue
-                # To the first place.
-                vx, vy = place[0, first, 0] - ball[X], place[0, first, 1] - ball[Y]
-                added = math.hypot(vx - ball[VX], vy - ball[VY])
-                if added > most_added:
-                    continue
-                miss = own_noise + math.hypot(vx, vy) * server[BALL_RAND] + noise * added / gain / server[MAX_POWER]
-                threat = begun | dangers[cycle, last]
-                to_vx, to_vy = vx * server[BALL_DECAY], vy * server[BALL_DECAY]
-                if stage == 3:
-                    threat |= dangers[0, first] & ~CUT_OFF
-                    next_vx = place[1, last, 0] - place[0, first, 0]
-                    next_vy = place[1, last, 1] - place[0, first, 1]
-                    if math.hypot(next_vx - to_vx, next_vy - to_vy) > most_acceleration(server, 0.9 * rate[first]):
-                        continue
-                    to_vx, to_vy = next_vx * server[BALL_DECAY], next_vy * server[BALL_DECAY]
-                # And from the last one on.
-                x, y = place[cycle, last, 0], place[cycle, last, 1]
-                metres = math.hypot(to_x - x, to_y - y)
-                cos, sin = (to_x - x) / metres, (to_y - y) / metres
-                speed = wanted
-                where = count
-                if math.hypot(wanted * cos - to_vx, wanted * sin - to_vy) > most_acceleration(server, rate[last]):
-                    speed = fastest(kick_limits(server, rate[last]), (cos, sin), (to_vx, to_vy))
-                    if (done and stage == 3) or speed <= fastest_so_far:
-                        continue
-                    # Of those that fall short one is kept; it takes the place of what was found last.
-                    where = count - 1
-                    if (stage == 2 and fastest_so_far == 0.0) or count == 0:
-                        where = count
-                    fastest_so_far = speed
-                else:
-                    done += 1
-                    if miss > me[AREA] - radius[first] - (0.05 if stage == 2 else 0.1):
-                        threat |= MISSED
-                speeds[where], powers[where] = speed, math.hypot(speed * cos - to_vx, speed * sin - to_vy) / rate[last]
-                velocity[where, 0], velocity[where, 1], kicks[where], threats[where] = vx, vy, stage, threat
-                count = max(count, where + 1)
-    best, chosen = -np.inf, -1
-    for index in range(count):
-        value = _judged(target, speeds[index], powers[index], kicks[index], threats[index])
-        if value > best:
-            best, chosen = value, index
-    if chosen < 0:
+
+@kernel
+def _peril(server: Array, player: Array, ball: Bearing, alarm: Alarm) -> int:
+    """Return the perils that one opponent is to a ball."""
+    lying = player[FROZEN] > 0
+    taken = ball.metres < (player[TOUCH] if lying else ball.reach + alarm.touch_m)
+    if taken or lying:
+        return alarm.taken * taken
+    dash_m, aside = alarm.dash * player[DASH_ACCEL], abs(ball.aside)
+    left = max(0.0, abs(ball.ahead) - dash_m)
+    runs_over = (left == 0.0) & (aside < ball.reach)
+    dashed = runs_over | (math.hypot(left, aside) < ball.reach - alarm.short_m)
+    in_length = (-alarm.tackle_back_m < ball.ahead) & (ball.ahead < dash_m + server[TACKLE_DIST] - alarm.tackle_m)
+    dash_tackled = in_length & (aside < alarm.tackle_part * server[TACKLE_WIDTH]) & (not dashed)
+    tackled = tackle_chance(server, ball.ahead, ball.aside, server[alarm.exponent]) > alarm.chance
+    return alarm.dashed * dashed | alarm.dash_tackled * dash_tackled | alarm.tackled * tackled
+
+
+@kernel
+def _perils(scene: Array, place: Array, cycle: int, alarm: Alarm, found: Ints) -> None:
+    """Add to ``found`` (n,) the perils of balls that are in places (n, 2) after so many cycles."""
+    ball = scene[BALL]
+    for opponent in range(OPPONENT, BALL):
+        player = scene[opponent]
+        if gap(player[X], player[Y], ball[X], ball[Y]) <= NEAR_M:
+            pose = pose_after(player, cycle)
+            for index in range(len(place)):
+                lies = bearing(player, pose, place[index, 0], place[index, 1])
+                found[index] |= _peril(scene[SERVER], player, lies, alarm)
+
+
+@kernel
+def _kicked_on(place: Array, target: Target) -> Array:
+    """Return (n, 2) where balls are one cycle after they are kicked on from places (n, 2)."""
+    onward = np.empty_like(place)
+    for index in range(len(place)):
+        x, y = target.x - place[index, 0], target.y - place[index, 1]
+        part = target.speed / math.hypot(x, y)
+        onward[index, 0], onward[index, 1] = place[index, 0] + part * x, place[index, 1] + part * y
+    return onward
+
+
+@kernel
+def _stages(scene: Array, target: Target, most: int) -> Stages:
+    """Return where the ball may be before each of at most ``most`` kicks."""
+    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
+    place, gain = np.empty((3, PLACES, 2)), np.empty((3, PLACES))
+    lies, rolls = np.zeros((3, PLACES), np.int64), np.zeros((3, PLACES), np.int64)
+    sent, opens, missed = np.empty((PLACES, 2)), np.empty(PLACES, np.bool_), np.empty(PLACES)
+    place[0, 0, 0], place[0, 0, 1], gain[0, 0] = ball[X], ball[Y], ball[GAIN]
+    noise = kick_noise(scene)
+    for index in range(PLACES if most > 1 else 0):
+        metres = min(max(me[TOUCH] + OFF_M, me[TOUCH] + me[MARGIN] * PLACE_PART[index]), me[AREA] - WITHIN_M)
+        for stage in range(1, 3):
+            x, y = beside(me, stage, metres, me[BODY] + PLACE_DEG[index])
+            place[stage, index, 0], place[stage, index, 1] = x, y
+            lies[stage, index] = OUTSIDE if abs(x) > GOAL_X or abs(y) > LINE_Y else 0
+            gain[stage, index] = kick_rate(me, metres, PLACE_DEG[index])
+        vx, vy, added = kick_to(ball, (place[1, index, 0], place[1, index, 1]))
+        sent[index, 0], sent[index, 1] = vx, vy
+        opens[index] = added <= most_acceleration(server, ball[GAIN])
+        missed[index] = metres + aim_error(scene, noise, math.hypot(vx, vy), added) - me[AREA]
+    for stage in range(most):
+        places = place[stage, : PLACES if stage else 1]
+        _perils(scene, places, 1, LIES, lies[stage])
+        _perils(scene, _kicked_on(places, target), stage + 1, ROLLS, rolls[stage])
+    return Stages(place, gain, lies, rolls, sent, opens, missed)
+
+
+@kernel
+def _comes(server: Array, stages: Stages, kicks: int, first: int, last: int) -> tuple[bool, float, float]:
+    """Return whether the kicks before the last can bring the ball to its place, and its velocity there.
+
+    Args:
+        kicks: 2 or 3. first, last: places after the first kick, and before the last; of two kicks they are one.
+    """
+    decay, vx, vy = server[BALL_DECAY], stages.sent[first, 0], stages.sent[first, 1]
+    if kicks == 2:
+        return stages.opens[first], decay * vx, decay * vy
+    on_x = stages.place[2, last, 0] - stages.place[1, first, 0]
+    on_y = stages.place[2, last, 1] - stages.place[1, first, 1]
+    added = gap(on_x, on_y, decay * vx, decay * vy)
+    turns = added <= most_acceleration(server, SECOND_PART * stages.gain[1, first])
+    return stages.opens[first] & turns, decay * on_x, decay * on_y
+
+
+@kernel
+def _last_kick(
+    server: Array, place: Array, gain: float, came: tuple[float, float], target: Target
+) -> tuple[float, float]:
+    """Return the speed towards the target that a kick gives, at most the wanted one, and its power.
+
+    Args:
+        place: (2,) of the ball. came: its velocity before.
+    """
+    x, y = target.x - place[0], target.y - place[1]
+    metres = math.hypot(x, y)
+    x, y, speed = x / metres, y / metres, target.speed
+    limits = kick_limits(server, gain)
+    if gap(speed * x, speed * y, came[0], came[1]) > limits[0]:
+        speed = fastest(limits, (x, y), came)
+    return speed, gap(speed * x, speed * y, came[0], came[1]) / gain
+
+
+@kernel
+def _worth(target: Target, kicks: int, speed: float, power: float, perils: int) -> float:
+    """Return what a sequence is worth, at most 1."""
+    short, several = max(0.0, target.speed - speed), kicks > 1
+    will_do = (short == 0.0) | ((not several) & (speed >= target.enough))
+    slow = SHORT_PRICE * (short > 0.0) if will_do else TOO_SLOW + SLOWER * short
+    hard = several * HARD_PRICES[np.searchsorted(HARD_POWERS, power)]
+    return 1.0 - slow - hard - KICKS_PRICE[kicks - 1] - PRICE[int(several), perils] - POWER_PRICE * power
+
+
+class Table(NamedTuple):
+    """Sequences of kicks that may be chosen.
+
+    Attributes:
+        speed: (n,) metres per cycle that the last kick gives. worth: (n,) see `_worth`.
+        first: (n,) place to which the first kick brings the ball; -1 of one that goes to the target.
+        filled: (1,) rows that are filled.
+    """
+
+    speed: Array
+    worth: Array
+    first: Ints
+    filled: Ints
+
+
+class Search(NamedTuple):
+    """Sequences that are to be tried.
+
+    Attributes:
+        kicks: 2 or 3. barred: perils that exclude a place.
+        pairs: (n, 2) places after the first kick and before the last; of two kicks one place, twice.
+    """
+
+    kicks: int
+    barred: int
+    pairs: Ints
+
+
+@kernel
+def _add(scene: Array, stages: Stages, target: Target, search: Search, table: Table) -> None:
+    """Add the possible sequences of a search to a table.
+
+    Of those that fall short only ever faster ones are added, and none of three kicks once the wanted speed is reached.
+    Each takes the row of the sequence before it, but for the first of two kicks.
+    """
+    kicks, barred, pairs = search
+    count = table.filled[0]
+    server = scene[SERVER]
+    begun = (stages.lies[0, 0] | stages.rolls[0, 0]) & ~CUT_OFF
+    enough = ENOUGH if kicks == 3 else PLACES
+    full, fastest_short, way = 0, 0.0, 0
+    while way < len(pairs) and full < enough:
+        first, last = pairs[way]
+        way += 1
+        perils = stages.lies[kicks - 1, last] | stages.rolls[kicks - 1, last]
+        if kicks == 3:
+            perils |= stages.lies[1, first] | (stages.rolls[1, first] & ~CUT_OFF)
+        if not stages.opens[first] or perils & barred:
+            continue
+        possible, vx, vy = _comes(server, stages, kicks, first, last)
+        if not possible:
+            continue
+        gain = stages.gain[kicks - 1, last]
+        speed, power = _last_kick(server, stages.place[kicks - 1, last], gain, (vx, vy), target)
+        short = speed < target.speed
+        if short and (speed <= fastest_short or (kicks == 3 and full > 0)):
+            continue
+        missed = not short and stages.missed[first] > -ROOM_M[kicks - 2]
+        row = max(0, count - 1) if short and (kicks == 3 or fastest_short > 0.0) else count
+        full, fastest_short = full + (not short), speed if short else fastest_short
+        table.speed[row], table.first[row] = speed, first
+        table.worth[row] = _worth(target, kicks, speed, power, perils | begun | MISSED * missed)
+        count = row + 1
+    table.filled[0] = count
+
+
+@kernel
+def best_sequence(scene: Array, order: Ints, target: Target, most: int) -> tuple[float, float, float]:
+    """Return the speed that the best of all sequences gives the ball, and its velocity after the first kick.
+
+    All in metres per cycle, all 0 where no sequence is possible. Risks are taken only where nothing else is fast
+    enough.
+
+    Args:
+        order: see `kick_order`. most: kicks, 1 or 3.
+    """
+    me, ball = scene[ACTOR], scene[BALL]
+    stages = _stages(scene, target, most)
+    most_rows = 1 if most == 1 else 1 + 2 * (PLACES + PAIRS)
+    table = Table(np.empty(most_rows), np.empty(most_rows), np.empty(most_rows, np.int64), np.zeros(1, np.int64))
+    speed, power = _last_kick(scene[SERVER], stages.place[0, 0], ball[GAIN], (ball[VX], ball[VY]), target)
+    perils = stages.lies[0, 0] | stages.rolls[0, 0]
+    table.speed[0], table.worth[0], table.first[0] = speed, _worth(target, 1, speed, power, perils), -1
+    table.filled[0] = 0 if perils & CUT_OFF else 1
+    facing = turned(direction(target.x - me[X], target.y - me[Y]) - me[BODY])
+    pairs = order[int(np.rint(DIRECTIONS * (facing + 180.0) / 360.0)) % DIRECTIONS]
+    for barred in (NEVER | RISKS, NEVER):
+        if most > 1 and (barred & RISKS or not (table.speed[: table.filled[0]] > target.enough).any()):
+            _add(scene, stages, target, Search(2, barred, SINGLES), table)
+            _add(scene, stages, target, Search(3, barred, pairs), table)
+    count = table.filled[0]
+    if count == 0:
         return 0.0, 0.0, 0.0
-    return speeds[chosen], velocity[chosen, 0], velocity[chosen, 1]
+    chosen = np.argmax(table.worth[:count])
+    speed, first = table.speed[chosen], table.first[chosen]
+    if first >= 0:
+        return speed, stages.sent[first, 0], stages.sent[first, 1]
+    part = speed / gap(target.x, target.y, ball[X], ball[Y])
+    return speed, part * (target.x - ball[X]), part * (target.y - ball[Y])

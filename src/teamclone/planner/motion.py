@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from teamclone.planner.scene import (
@@ -21,6 +23,7 @@ from teamclone.planner.scene import (
     Array,
     X,
     Y,
+    inertia_point,
     kernel,
 )
 from teamclone.rcss.server_params import SERVER_FIELD
@@ -28,9 +31,9 @@ from teamclone.rcss.server_params import SERVER_FIELD
 S_X, S_Y, S_VX, S_VY, S_STAMINA, S_EFFORT, S_RECOVERY, S_CAPACITY = range(8)
 """Columns of a player's motion, a part of the columns of a player."""
 (_MOST, _TOTAL, _RECOVER_THR, _RECOVER_DEC, _RECOVER_MIN, _EFFORT_DEC_THR, _EFFORT_DEC, _EFFORT_INC_THR, _EFFORT_INC,
- _ACCEL_MAX) = (SERVER_FIELD[name] for name in (
+ _ACCEL_MAX, _SIDE_RATE, _BACK_RATE) = (SERVER_FIELD[name] for name in (
     "stamina_max", "stamina_capacity", "recover_dec_thr", "recover_dec", "recover_min", "effort_dec_thr", "effort_dec",
-    "effort_inc_thr", "effort_inc", "player_accel_max"))  # fmt: skip
+    "effort_inc_thr", "effort_inc", "player_accel_max", "side_dash_rate", "back_dash_rate"))  # fmt: skip
 
 
 @kernel
@@ -90,3 +93,23 @@ def spare(server: Array, me: Array, motion: Array, reserve: float, last: bool) -
     spends_all = last and motion[S_CAPACITY] <= 0
     kept = -me[EXTRA] if spends_all else server[_RECOVER_THR] * server[_MOST] + reserve
     return min(max(0.0, motion[S_STAMINA] - kept), server[MAX_DASH])
+
+
+@kernel
+def dash_rate(server: Array, degrees: float) -> float:
+    """Return what part of a dash's power its direction leaves; `dynamics.formulas.dash_rate`.
+
+    Args:
+        degrees: off the body, -180 to 180.
+    """
+    quarters, side = abs(degrees) / 90.0, server[_SIDE_RATE]
+    to_side, to_back = min(quarters, 1.0), max(quarters - 1.0, 0.0)
+    return 1.0 + (side - 1.0) * to_side + (server[_BACK_RATE] - side) * to_back
+
+
+@kernel
+def beside(player: Array, cycle: int, metres: float, degrees: float) -> tuple[float, float]:
+    """Return the place so far from where a player drifts to, in a direction on the pitch."""
+    x, y = inertia_point(player, cycle)
+    angle = math.radians(degrees)
+    return x + metres * math.cos(angle), y + metres * math.sin(angle)

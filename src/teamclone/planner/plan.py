@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from teamclone.planner.dribble import best_dribble
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.hold_ball import hold_ball, stays
 from teamclone.planner.keep_dribble import underway
-from teamclone.planner.kick_table import Target, best_sequence, kick_order
+from teamclone.planner.kick_table import ORDER_FIELDS, Target, best_sequence, kick_order
 from teamclone.planner.passes import best_pass
 from teamclone.planner.scene import (
     ACTOR,
@@ -270,16 +270,18 @@ def _compiled() -> Any:
     version = zlib.crc32(b"".join(path.read_bytes() for path in sources))
 
     @njit(cache=True, nogil=True, error_model="numpy")
-    def plan_all(made_from: Array, actors: NDArray[np.int64], order: NDArray[np.int64], made: Array) -> int:
+    def plan_all(
+        made_from: Array, actors: NDArray[np.int64], orders: NDArray[np.int64], which: NDArray[np.int64], made: Array
+    ) -> int:
         for index in range(len(actors)):
-            _plan(made_from[index], actors[index], order, made[index])
+            _plan(made_from[index], actors[index], orders[which[index]], made[index])
         return version
 
     return plan_all
 
 
 _plan_all = _compiled()
-_order = cache(kick_order)
+_order = lru_cache(maxsize=64)(kick_order)
 
 
 tell_when_compiled({_plan_all: "compiling the plans with the ball, once (half a minute)"})
@@ -295,5 +297,7 @@ def plan(ball: Array, players: Array, types: Array, server: Array, actor: NDArra
     """
     made = np.zeros((len(actor), len(PLAN)))
     if len(actor):
-        _plan_all(scenes(ball, players, types, server), actor, _order(), made)
+        servers, which = np.unique(server[:, ORDER_FIELDS].astype(np.float64), axis=0, return_inverse=True)
+        orders = np.stack([_order(tuple(row)) for row in servers.tolist()])
+        _plan_all(scenes(ball, players, types, server), actor, orders, which.reshape(-1), made)
     return made

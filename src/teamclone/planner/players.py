@@ -174,10 +174,38 @@ def seen_from(player: Array, place: tuple[float, float], cycle: int) -> tuple[fl
     return along(place[0] - from_x, place[1] - from_y, math.cos(body), math.sin(body))
 
 
+class Pose(NamedTuple):
+    """Where a player stands, metres on the pitch, and the cosine and sine of its body."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+
+
 @kernel
-def after_dash(ahead: float, aside: float, dash_m: float) -> float:
-    """Return how near a dash of at most ``dash_m``, ahead or back, brings a player to a place."""
-    return math.hypot(max(0.0, abs(ahead) - dash_m), aside)
+def pose_after(player: Array, cycle: int) -> Pose:
+    """Return the pose of a player after so many cycles in which it does nothing."""
+    x, y = inertia_point(player, cycle)
+    body = math.radians(player[BODY])
+    return Pose(x, y, math.cos(body), math.sin(body))
+
+
+class Bearing(NamedTuple):
+    """How a ball lies to a player: metres ahead of it and aside, between their centres, and to which it has a ball."""
+
+    ahead: float
+    aside: float
+    metres: float
+    reach: float
+
+
+@kernel
+def bearing(player: Array, pose: Pose, x: float, y: float) -> Bearing:
+    """Return how a ball in a place lies to a player in a pose."""
+    way_x, way_y = x - pose.x, y - pose.y
+    ahead, aside = along(way_x, way_y, pose.cos, pose.sin)
+    return Bearing(ahead, aside, math.hypot(way_x, way_y), reach_of(player, x, y))
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from teamclone.dynamics import formulas
-from teamclone.planner import ball, hold_ball, motion, players, scene, tackle
+from teamclone.planner import ball, motion, players, scene, tackle
 from teamclone.rcss.player_types import DEFAULTS as TYPE
 from teamclone.rcss.server_params import FIELDS, SERVER_DEFAULTS
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD, TYPE_FIELD
@@ -54,9 +54,22 @@ def dash_rate(random: Random) -> tuple[float, float]:
     degrees = random.uniform(0, 180)
     names = ("side_dash_rate", "back_dash_rate")
     sign = random.choice([-1, 1])
-    return hold_ball.dash_rate(row, sign * degrees), float(
+    return motion.dash_rate(row, sign * degrees), float(
         formulas.dash_rate(degrees, **{name: server[name] for name in names})
     )
+
+
+def limited(random: Random) -> tuple[object, object]:
+    x, y, most = random.uniform(-3, 3), random.uniform(-3, 3), random.uniform(0, 3)
+    return ball.limited(x, y, most), tuple(float(part) for part in formulas.limited(x, y, most))
+
+
+def fastest(random: Random) -> tuple[float, float]:
+    angle = random.uniform(-4, 4)
+    velocity, toward = tuple(random.uniform(-2, 2, 2).tolist()), (math.cos(angle), math.sin(angle))
+    most, limit = random.uniform(0.5, 3), random.uniform(0.5, 3)
+    wanted = formulas.fastest(velocity, toward, most_added=most, ball_speed_max=limit)
+    return ball.fastest((most, limit), toward, velocity), float(wanted)
 
 
 def turn(random: Random) -> tuple[float, float]:
@@ -132,8 +145,8 @@ def rested(random: Random) -> tuple[object, object]:
     ]
 
 
-FORMULAS = (kick_rate, kickable_area, dash_rate, turn, turns, tackle_failure, tackle_power, roll, inertia_point,
-            cycles_over, dashes, rested)  # fmt: skip
+FORMULAS = (kick_rate, kickable_area, dash_rate, limited, fastest, turn, turns, tackle_failure, tackle_power, roll,
+            inertia_point, cycles_over, dashes, rested)  # fmt: skip
 
 
 @pytest.mark.parametrize("both", FORMULAS, ids=lambda both: both.__name__)

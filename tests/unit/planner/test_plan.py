@@ -14,10 +14,10 @@ from tests.situations import put, resting, situations
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.dataset.reader import open_dataset
 from teamclone.models.inputs.planned import plans
-from teamclone.planner.kick_table import COUNTS, PLACES, kick_order
+from teamclone.planner.kick_table import ORDER_FIELDS, PLACE_DEG, PLACES, kick_order
 from teamclone.planner.plan import CHOICES, MOST_VALUE_M, PLAN, VALUED
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
-from teamclone.rcss.server_params import SERVER_FIELD
+from teamclone.rcss.server_params import SERVER_DEFAULTS, SERVER_FIELD
 from teamclone.store import create_store
 from teamclone.store.ingest import ingest
 from teamclone.world.channels import CHANNEL, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING, TYPE_FIELD
@@ -288,12 +288,11 @@ def test_what_is_too_much_for_one_kick_is_prepared() -> None:
 
 def test_kick_order() -> None:
     """Straight ahead those come first that go from far behind him to far ahead, straight back the others."""
-    order = kick_order()
+    order = kick_order(tuple(SERVER_DEFAULTS[[*ORDER_FIELDS]]))
     assert order.shape == (72, 1024, 2)
     assert (order.min(), order.max()) == (0, PLACES - 1)
-    angles = np.concatenate([360.0 / count * np.arange(count) - 180.0 for count in COUNTS])
     for direction, sign in ((36, 1.0), (0, -1.0)):
-        way = np.cos(np.radians(angles[order[direction]]))  # how far ahead both places are
+        way = np.cos(np.radians(PLACE_DEG[order[direction]]))  # how far ahead both places are
         gained = sign * (way[:, 1] - way[:, 0])
         assert gained[:50].mean() > 1.5 > gained.mean() > gained[-50:].mean()
 

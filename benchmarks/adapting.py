@@ -3,7 +3,7 @@
     python benchmarks/adapting.py MATCHES --base RUN --team NAME [--matches 1 2 3 5 10] [--json]
 
 MATCHES is a folder of logs, or a store that `teamclone ingest` made. RUN is a clone of other teams, best one that never
-met these matches: what it was trained on among the test matches is told. The training matches of the team are taken in
+met these matches: test matches that it was trained on are reported. The training matches of the team are taken in
 one order for all, so that the 3 hold the 1; validation matches, which choose the checkpoint, and test matches are the
 same for all. The fresh network is the base's, with normalisation fitted and weights drawn anew; it goes through as many
 batches of the same size, so that it takes the same time; its learning rate is that with which the base was trained.

@@ -119,7 +119,7 @@ REMEDIES: dict[str, tuple[str, ...]] = {
     "ensemble": ("model.ensemble_size=3",),
     "without-temperature": ("train.calibrate=false",),
 }
-"""What is said to help with rare commands: name and settings beside those of the short schedule."""
+"""Remedies for rare commands: name and settings beside those of the short schedule."""
 
 TINY = (
     *("data.batch_size=512", "data.batches_per_epoch=4", "data.validation_batches=2", "model.hidden=[32]"),
@@ -440,7 +440,7 @@ class Work:
         data = self.folder_of(experiment.matches)
         return self.teamclone("train", data, "--preset", experiment.preset, *sets, "--out", folder)
 
-    def told(self, command: Sequence[str]) -> str:
+    def shown(self, command: Sequence[str]) -> str:
         """A command as a person types it, on MATCHES and with results in DIR."""
         text = " ".join(command).replace(f"{sys.executable} -m teamclone", "teamclone")
         return text.replace(str(self.options.matches), "MATCHES").replace(str(self.out), "DIR")
@@ -543,9 +543,9 @@ class Work:
         return found
 
     def plans(self) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
-        """By set, how many kicks are as planned, and of who can kick the ball, by what is planned, what he does.
+        """By set, how many kicks are as planned, and for each planned action what the player does.
 
-        Kicks are told by the velocity that they give the ball, to EXACT metres per cycle.
+        Kicks are compared by the velocity that they give the ball, to EXACT metres per cycle.
         """
         rows, made, given = self._with_ball()
         kinds = self.dataset.samples["kind"].numpy()[rows]
@@ -581,8 +581,8 @@ class Work:
         outcome = predict(open_run(self.out / "runs" / "best-0").load_model(), self.dataset, rows)
         place = [item.name for item in PARAMETERS].index("tackle_direction")
 
-        def right(said: NDArray[np.float32]) -> NDArray[np.bool_]:
-            away = said - outcome.issued[:, place]
+        def right(predicted: NDArray[np.float32]) -> NDArray[np.bool_]:
+            away = predicted - outcome.issued[:, place]
             found: NDArray[np.bool_] = np.abs((away + 180.0) % 360.0 - 180.0) < EXACT_DEG
             return found
 
@@ -773,7 +773,7 @@ def main() -> None:
     trainings = experiments(
         n_train=n_train, scale=options.minutes_scale, short_epochs=options.short_epochs, quick=options.quick
     )
-    for experiment in trainings:  # a wrong setting is told before the hours of work
+    for experiment in trainings:  # a wrong setting is reported before the hours of work
         load_config(experiment.preset, experiment.overrides)
     tree = {"rows": TREE_ROWS, "iterations": max(1, round(TREE_ITERATIONS * options.minutes_scale))}
     tree = {"rows": 4000, "iterations": 3} if options.quick else tree
@@ -805,7 +805,7 @@ def main() -> None:
         left=json.loads(left.read_text(encoding="utf-8")) if left.is_file() else {},
         variants={"t": TRAINING, "k": KICKS, "d": ablations(), "e": REMEDIES},
         cleaning=work.dataset.meta["cleaning"],
-        commands=[work.told(command) for command in (*work.commands, *map(work.training, there))],
+        commands=[work.shown(command) for command in (*work.commands, *map(work.training, there))],
         situations=SITUATIONS,
         sure=SURE,
     )

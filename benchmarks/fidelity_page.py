@@ -564,12 +564,12 @@ def _reproduce(results: Results, commands: Sequence[str]) -> str:
 
 def machines(found: Iterable[Mapping[str, Any]]) -> str:
     """A sentence on where results were made, and with which versions."""
-    told = {
+    found = {
         f"{machine['processor']}, {machine['threads']} threads; teamclone {machine['teamclone']}, "
         f"PyTorch {machine['torch']}, NumPy {machine['numpy']}, Python {machine['python']}"
         for machine in found
     }
-    return f"Machine and versions: {'; and '.join(sorted(told))}."
+    return f"Machine and versions: {'; and '.join(sorted(found))}."
 
 
 def plot(curve: Mapping[str, Any]) -> str:

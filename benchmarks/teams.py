@@ -174,7 +174,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="beside preset best")
     parser.add_argument("--page", type=Path, help="the page to write; default DIR/teams.md")
     options = parser.parse_args()
-    load_config("best", options.set)  # a wrong setting is told before the work
+    load_config("best", options.set)  # a wrong setting is reported before the work
     work = Work(options)
     work.teamclone("ingest", options.matches, "--store", work.out / "store", made=work.out / "store")
     clones = {team: work.clone(team, [team]) for team in options.teams}

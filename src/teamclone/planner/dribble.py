@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teamclone.planner.ball import most_acceleration, speed_over
 from teamclone.planner.field_evaluator import evaluate
-from teamclone.planner.motion import S_X, S_Y, dash, drift, motion_of, spare
+from teamclone.planner.motion import dash_metres
 from teamclone.planner.players import DRIBBLE, HARDLY_M, arrival
 from teamclone.planner.scene import (
     ACTOR,
@@ -17,7 +18,6 @@ from teamclone.planner.scene import (
     BALL_DECAY,
     BALL_SPEED_MAX,
     BODY,
-    DECAY,
     GAIN,
     GOAL_X,
     LINE_Y,
@@ -25,6 +25,7 @@ from teamclone.planner.scene import (
     OPPONENT,
     SERVER,
     TOUCH,
+    TURN,
     VX,
     VY,
     Array,
@@ -35,7 +36,6 @@ from teamclone.planner.scene import (
     gap,
     inertia_point,
     kernel,
-    most_turn,
     turned,
 )
 
@@ -51,21 +51,45 @@ SEEN_M = 20.0
 OFF_M = 0.1
 """By how much a ball has to pass the player at least."""
 INSIDE_M = 1.0
-VALUE, SPEED, DIRECTION = range(3)
-"""Columns of what is found: its value, the speed of the ball and its direction."""
+VALUE, SPEED, DIRECTION, TO_X, TO_Y, ARRIVES, COLUMNS = range(7)
+"""Columns of a way to kick the ball and run after it, and how many: its value, the speed of the ball and its direction,
+where it is met and after how many cycles."""
 
 
 @kernel
 def nothing() -> Array:
-    """Return (3,) what is found where there is nothing."""
-    return np.array([-np.inf, 0.0, 0.0])
+    """Return (COLUMNS,) what is found where there is nothing."""
+    none = np.zeros(COLUMNS)
+    none[VALUE] = -np.inf
+    return none
 
 
 @kernel
-def passes_actor(scene: Array, x: float, y: float) -> bool:
-    """Return whether a ball that is in this place in the next cycle has not hit the actor."""
-    next_x, next_y = inertia_point(scene[ACTOR], 1)
-    return gap(x, y, next_x, next_y) >= scene[ACTOR, TOUCH] + OFF_M
+def meet(scene: Array, x: float, y: float, cycles: int, made: Array) -> bool:
+    """Fill the kick that has the ball in a place after so many cycles; return whether one kick does, past the actor.
+
+    Args:
+        made: (COLUMNS,).
+    """
+    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
+    metres = gap(x, y, ball[X], ball[Y])
+    if metres < HARDLY_M:
+        return False
+    speed = speed_over(metres, cycles, server[BALL_DECAY])
+    vx, vy = speed * (x - ball[X]) / metres, speed * (y - ball[Y]) / metres
+    passed = gap(ball[X] + vx, ball[Y] + vy, me[X] + me[VX], me[Y] + me[VY]) >= me[TOUCH] + OFF_M
+    kicked = gap(vx, vy, ball[VX], ball[VY]) <= most_acceleration(server, ball[GAIN])
+    if not (passed and kicked and speed <= server[BALL_SPEED_MAX]):
+        return False
+    made[VALUE], made[SPEED], made[DIRECTION] = evaluate(scene, x, y, True), speed, direction(vx, vy)
+    made[TO_X], made[TO_Y], made[ARRIVES] = x, y, cycles
+    return True
+
+
+@kernel
+def by_value(made: Array) -> NDArray[np.int64]:
+    """Return (len(made),) the rows from the greatest value on; of equal ones the first comes first."""
+    return np.argsort(-made[:, VALUE], kind="mergesort")
 
 
 @kernel
@@ -84,18 +108,6 @@ def _hindered(scene: Array, place: tuple[float, float], cycles: int) -> bool:
 
 
 @kernel
-def _turns_to(me: Array, off: float) -> tuple[int, float]:
-    """Return the turns after which the player nearly faces what is ``off`` degrees aside, and the degrees left then."""
-    left, count = abs(off), 0
-    speed = math.hypot(me[VX], me[VY])
-    while left > FACED_DEG and count <= MOST_TURNS:
-        speed *= me[DECAY]
-        left = max(0.0, left - most_turn(me, speed))
-        count += 1
-    return count, math.copysign(left, off)
-
-
-@kernel
 def _allowed(me: Array, angle: float) -> bool:
     """Return whether a dribble may go in this direction from where the player is."""
     near_goal = me[X] < OWN_GOAL_X and abs(me[Y]) < OWN_GOAL_Y
@@ -104,40 +116,37 @@ def _allowed(me: Array, angle: float) -> bool:
 
 
 @kernel
-def best_dribble(scene: Array) -> Array:
-    """Return (3,) the free dribble of the greatest value; VALUE is minus infinity where there is none."""
-    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
-    best = nothing()
-    ahead = me[TOUCH] + AHEAD * me[MARGIN]
+def _dribbles(scene: Array) -> Array:
+    """Return (n, COLUMNS) the dribbles that one kick begins, whatever opponents do."""
+    me = scene[ACTOR]
+    turnable = me[TURN : TURN + MOST_TURNS + 1] - me[TURN]  # turns follow the kick: the player is slower by a cycle
+    run_m = np.empty((MOST_TURNS + 1, DASHES[1]))
+    for turns in range(MOST_TURNS + 1):
+        dash_metres(scene, 1 + turns, RESERVE, False, run_m[turns])
+    run_m += me[TOUCH] + AHEAD * me[MARGIN]
+    made, count = np.empty((DIRECTIONS * DASHES[1], COLUMNS)), 0
     for index in range(DIRECTIONS):
         off = turned(360.0 / DIRECTIONS * index)
-        if not _allowed(me, turned(me[BODY] + off)):
+        turns = int(np.searchsorted(turnable, abs(off) - FACED_DEG))
+        if turns > MOST_TURNS or not _allowed(me, turned(me[BODY] + off)):
             continue
-        turns, left = _turns_to(me, off)
-        if turns > MOST_TURNS:
-            continue
-        angle = math.radians(me[BODY] + off - left)
-        heading = math.cos(angle), math.sin(angle)
-        motion = motion_of(me)
-        for _ in range(1 + turns):
-            drift(server, me, motion)
-        for count in range(1, DASHES[1] + 1):
-            dash(server, me, motion, spare(server, me, motion, RESERVE, False), heading)
-            x, y = motion[S_X] + ahead * heading[0], motion[S_Y] + ahead * heading[1]
-            if count < DASHES[0] or abs(x) > GOAL_X - INSIDE_M or abs(y) > LINE_Y - INSIDE_M:
-                continue
-            cycles, metres = 1 + turns + count, gap(x, y, ball[X], ball[Y])
-            if metres < HARDLY_M:
-                continue
-            speed = speed_over(metres, cycles, server[BALL_DECAY])
-            vx, vy = speed * (x - ball[X]) / metres, speed * (y - ball[Y]) / metres
-            if speed > server[BALL_SPEED_MAX] or gap(vx, vy, ball[VX], ball[VY]) > most_acceleration(
-                server, ball[GAIN]
-            ):
-                continue
-            value = evaluate(scene, x, y, True)
-            if value <= best[VALUE] or not passes_actor(scene, ball[X] + vx, ball[Y] + vy):
-                continue
-            if not _hindered(scene, (x, y), cycles):
-                best[VALUE], best[SPEED], best[DIRECTION] = value, speed, direction(vx, vy)
-    return best
+        left = max(0.0, abs(off) - turnable[turns])
+        angle = math.radians(me[BODY] + off - math.copysign(left, off))
+        for dashes in range(DASHES[0], DASHES[1] + 1):
+            cycles, metres = 1 + turns + dashes, run_m[turns, dashes - 1]
+            drift_x, drift_y = inertia_point(me, cycles)
+            x, y = drift_x + metres * math.cos(angle), drift_y + metres * math.sin(angle)
+            inside = abs(x) <= GOAL_X - INSIDE_M and abs(y) <= LINE_Y - INSIDE_M
+            if inside and meet(scene, x, y, cycles, made[count]):
+                count += 1
+    return made[:count]
+
+
+@kernel
+def best_dribble(scene: Array) -> Array:
+    """Return (COLUMNS,) the free dribble of the greatest value; VALUE is minus infinity where there is none."""
+    made = _dribbles(scene)
+    for index in by_value(made):
+        if not _hindered(scene, (made[index, TO_X], made[index, TO_Y]), int(made[index, ARRIVES])):
+            return made[index]
+    return nothing()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from teamclone.planner.scene import (
     AREA,
     BALL,
@@ -34,30 +36,42 @@ LEAST_STEP_DEG, SHOTS = 2.0, 10
 
 
 @kernel
+def _hidden(scene: Array, x: float, y: float, actor: bool) -> tuple[Array, Array]:
+    """Return (n,) the middles of what opponents hide of the view from a place, and half its widths, degrees."""
+    middles, halves, count = np.empty(BALL - OPPONENT), np.empty(BALL - OPPONENT), 0
+    for player in scene[OPPONENT:BALL]:
+        if gap(player[X], player[Y], x, y) <= BLOCKING_M:
+            rest_x, rest_y = at_rest(player)
+            cover = GOALKEEPER_M if player[GOALKEEPER] > 0 else player[AREA]
+            half = math.degrees(math.asin(min(1.0, cover / max(1e-9, gap(rest_x, rest_y, x, y)))))
+            middles[count], halves[count] = direction(rest_x - x, rest_y - y), half if actor else 0.5 * half
+            count += 1
+    return middles[:count], halves[:count]
+
+
+@kernel
 def can_shoot(scene: Array, x: float, y: float, actor: bool) -> bool:
-    """Return whether there is a gap between opponents for a shot from here, of the actor or of a team mate."""
+    """Return whether there is a gap between opponents for a shot from here, of the actor or of a team mate.
+
+    Opponents close intervals of the goal mouth, each as much wider to both sides as a shot needs. Shots are steps
+    apart: of what is left open between two intervals, only a part with a step in it counts.
+    """
     if gap(GOAL_X, 0.0, x, y) > SHOOT_FROM_M:
         return False
-    low, high = direction(GOAL_X - x, POST_M - GOAL_Y - y), direction(GOAL_X - x, GOAL_Y - POST_M - y)
-    width = abs(turned(high - low))
+    right, left = direction(GOAL_X - x, POST_M - GOAL_Y - y), direction(GOAL_X - x, GOAL_Y - POST_M - y)
+    width = abs(turned(left - right))
     step = max(LEAST_STEP_DEG, width / SHOTS)
-    needed = ACTOR_SHOT_DEG if actor else SHOT_DEG
-    for shot in range(int((width + 0.001) / step) + 1):
-        free = 180.0
-        for opponent in range(OPPONENT, BALL):
-            player = scene[opponent]
-            if gap(player[X], player[Y], x, y) > BLOCKING_M:
-                continue
-            rest_x, rest_y = at_rest(player)
-            away = gap(rest_x, rest_y, x, y)
-            cover = GOALKEEPER_M if player[GOALKEEPER] > 0 else player[AREA]
-            hidden = math.degrees(math.asin(min(cover / max(away, 1e-9), 1.0)))
-            if not actor:
-                hidden *= 0.5
-            free = min(free, abs(turned(direction(rest_x - x, rest_y - y) - low - shot * step)) - hidden)
-        if free >= needed:
-            return True
-    return False
+    middles, halves = _hidden(scene, x, y, actor)
+    halves += ACTOR_SHOT_DEG if actor else SHOT_DEG
+    from_right = 0.5 * width + (middles - right - 0.5 * width + 180.0) % 360.0 - 180.0
+    begins, ends = from_right - halves, from_right + halves
+    free = 0.0
+    for index in np.argsort(begins):
+        if begins[index] >= free:
+            break
+        if ends[index] > free:
+            free = step * math.ceil(ends[index] / step)
+    return free <= width + 0.001
 
 
 @kernel

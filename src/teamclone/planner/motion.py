@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from teamclone.planner.scene import (
+    ACTOR,
     CAPACITY,
     DASH_RATE,
     DECAY,
@@ -16,6 +17,7 @@ from teamclone.planner.scene import (
     EXTRA,
     MAX_DASH,
     RECOVERY,
+    SERVER,
     STAMINA,
     STAMINA_INC,
     VX,
@@ -113,3 +115,30 @@ def beside(player: Array, cycle: int, metres: float, degrees: float) -> tuple[fl
     x, y = inertia_point(player, cycle)
     angle = math.radians(degrees)
     return x + metres * math.cos(angle), y + metres * math.sin(angle)
+
+
+@kernel
+def dash_metres(scene: Array, waits: int, reserve: float, last: bool, metres: Array) -> int:
+    """Fill how far 1, 2, ... dashes straight ahead bring the actor beyond where it drifts to.
+
+    Dashes add to the drift, and their powers depend on stamina alone: all directions share these metres.
+
+    Args:
+        waits: cycles before the first dash. reserve, last: see `spare`. metres: (most dashes,).
+
+    Returns:
+        How many dashes there are until the first one without power.
+    """
+    server, me = scene[SERVER], scene[ACTOR]
+    motion = motion_of(me)
+    motion[:S_STAMINA] = 0.0
+    for _ in range(waits):
+        recover(server, me, motion)
+    strong = len(metres)
+    for count in range(len(metres)):
+        power = spare(server, me, motion, reserve, last)
+        if power <= 0:
+            strong = min(strong, count)
+        dash(server, me, motion, power, (1.0, 0.0))
+        metres[count] = motion[S_X]
+    return strong

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after
 from teamclone.planner.scene import (
     AREA,
@@ -152,6 +155,15 @@ def first_cycle(scene: Array, player: Array, path: Path, behind_m: float) -> int
     """Return the first cycle in which a player may be on the path of the ball; NEVER_CYCLES for one behind it."""
     ahead, aside = along(player[X] - scene[BALL, X], player[Y] - scene[BALL, Y], path.cos, path.sin)
     return NEVER_CYCLES if ahead < behind_m else max(1, int(abs(aside) / player[TOP]))
+
+
+@kernel
+def first_cycles(scene: Array, rows: NDArray[np.int64], path: Path, behind_m: float) -> NDArray[np.int64]:
+    """Return (len(rows),) `first_cycle` of the players in these rows of the scene."""
+    first = np.empty(len(rows), np.int64)
+    for place, row in enumerate(rows):
+        first[place] = first_cycle(scene, scene[row], path, behind_m)
+    return first
 
 
 @kernel

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from teamclone.planner.ball import Path, ball_after, fastest_from, speed_over
-from teamclone.planner.dribble import DIRECTION, SPEED, VALUE, nothing, passes_actor
-from teamclone.planner.field_evaluator import evaluate
-from teamclone.planner.motion import S_X, S_Y, dash, drift, motion_of, spare
+from teamclone.planner.ball import Path, ball_after
+from teamclone.planner.dribble import ARRIVES, COLUMNS, DIRECTION, SPEED, TO_X, TO_Y, by_value, meet, nothing
+from teamclone.planner.motion import dash_metres
 from teamclone.planner.players import (
     SELF_PASS,
     SELF_PASS_AHEAD,
@@ -20,25 +20,19 @@ from teamclone.planner.players import (
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
-    BALL_DECAY,
     BODY,
     DASH_ACCEL,
-    DECAY,
-    GAIN,
     GOAL_X,
     LINE_Y,
     OPPONENT,
-    SERVER,
-    VX,
-    VY,
+    TURN,
     Array,
     X,
     Y,
     along,
-    direction,
     gap,
+    inertia_point,
     kernel,
-    most_turn,
     turned,
 )
 
@@ -66,13 +60,10 @@ def _overtaken(scene: Array, place: tuple[float, float], path: Path, cycles: int
     """Return whether an opponent has the ball in the next cycle or at its end."""
     ball = scene[BALL]
     next_ball = ball_after(scene, path, 1)
-    for opponent in range(OPPONENT, BALL):
-        player = scene[opponent]
+    for player in scene[OPPONENT:BALL]:
         ahead, aside = seen_from(player, next_ball, 1)
-        reach = reach_of(player, next_ball[0], next_ball[1])
-        if math.hypot(ahead, aside) < reach + AT_ONCE_M:
-            return True
-        if math.hypot(ahead - player[DASH_ACCEL], aside) < reach:
+        drifted, dashed = math.hypot(ahead, aside) - AT_ONCE_M, math.hypot(ahead - player[DASH_ACCEL], aside)
+        if min(drifted, dashed) < reach_of(player, next_ball[0], next_ball[1]):
             return True
         before, _ = along(player[X] - ball[X], player[Y] - ball[Y], path.cos, path.sin)
         allowance = SELF_PASS_AHEAD if before > IN_THE_WAY_M else SELF_PASS
@@ -82,59 +73,50 @@ def _overtaken(scene: Array, place: tuple[float, float], path: Path, cycles: int
 
 
 @kernel
-def _run(scene: Array, angle: float, turns: int, places: Array) -> int:
-    """Fill where the player is after each dash in a direction, and return how many there are.
+def _counts(most: int) -> NDArray[np.int64]:
+    """Return the numbers of dashes that are tried where there may be so many, the greatest first."""
+    counts = np.arange(most, LEAST_DASHES - 1, -1)
+    return counts[(counts < STRIDE_DASHES) | ((most - counts) % 2 == 0)]
 
-    Args:
-        angle: of the dashes on the pitch, degrees. turns: before them, 0 or 1. places: (most dashes, 2).
-    """
-    me, server = scene[ACTOR], scene[SERVER]
-    heading = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    motion = motion_of(me)
-    for _ in range(1 + turns):
-        drift(server, me, motion)
-    for count in range(len(places)):
-        power = spare(server, me, motion, RESERVE, True)
-        if power <= 0:
-            return count
-        dash(server, me, motion, power, heading)
-        x, y = motion[S_X], motion[S_Y]
-        if x > GOAL_X - INSIDE_M[0] or (abs(y) > LINE_Y - INSIDE_M[1] and y * angle > 0):
-            return count
-        places[count, 0], places[count, 1] = x, y
-    return len(places)
+
+@kernel
+def _self_passes(scene: Array) -> Array:
+    """Return (n, COLUMNS) the self passes that one kick begins, whatever opponents do."""
+    me, ball = scene[ACTOR], scene[BALL]
+    zone = int(np.searchsorted(np.array(MOST_X), ball[X], side="right"))
+    metres = np.empty((2, MOST_DASHES[zone]))
+    strong = [dash_metres(scene, 1 + turns, RESERVE, True, metres[turns]) for turns in range(2)]
+    one_turn, widest = me[TURN + 1] - me[TURN], WIDEST_DEG if ball[X] < FORWARD_X else 180.0
+    made, count = np.empty((DIRECTIONS * MOST_DASHES[zone], COLUMNS)), 0
+    for index in range(DIRECTIONS):
+        off, turns = turned(STEP_DEG * index), min(index, 1)
+        angle = turned(me[BODY] + off)
+        if abs(off) > one_turn or abs(angle) > widest:
+            continue
+        cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        places, inside = np.empty((strong[turns], 2)), strong[turns]
+        for dashes in range(1, strong[turns] + 1):
+            drift_x, drift_y = inertia_point(me, 1 + turns + dashes)
+            x, y = drift_x + metres[turns, dashes - 1] * cos, drift_y + metres[turns, dashes - 1] * sin
+            places[dashes - 1] = x, y
+            if x > GOAL_X - INSIDE_M[0] or (abs(y) > LINE_Y - INSIDE_M[1] and y * angle > 0):
+                inside = min(inside, dashes - 1)
+        for dashes in _counts(inside):
+            x, y = places[dashes - 1]
+            away = gap(x, y, -GOAL_X, 0.0) >= OWN_GOAL_M
+            if away and meet(scene, x, y, 1 + turns + dashes, made[count]):
+                count += 1
+    return made[:count]
 
 
 @kernel
 def best_self_pass(scene: Array) -> Array:
-    """Return (3,) the safe self pass of the greatest value; VALUE is minus infinity where there is none."""
-    me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
-    best = nothing()
-    most = MOST_DASHES[0]
-    for part in range(len(MOST_X)):
-        if ball[X] >= MOST_X[part]:
-            most = MOST_DASHES[part + 1]
-    one_turn = most_turn(me, math.hypot(me[VX], me[VY]) * me[DECAY])
-    places = np.empty((most, 2))
-    for index in range(DIRECTIONS):
-        off = turned(STEP_DEG * index)
-        angle = turned(me[BODY] + off)
-        if abs(off) > one_turn or (ball[X] < FORWARD_X and abs(angle) > WIDEST_DEG):
-            continue
-        turns = 1 if index else 0
-        count = _run(scene, angle, turns, places)
-        while count >= LEAST_DASHES:
-            x, y = places[count - 1, 0], places[count - 1, 1]
-            cycles = 1 + turns + count
-            count -= 1 if count <= STRIDE_DASHES else 2
-            value = evaluate(scene, x, y, True)
-            if value <= best[VALUE] or gap(x, y, -GOAL_X, 0.0) < OWN_GOAL_M:
-                continue
-            metres = gap(x, y, ball[X], ball[Y])
-            path = Path(speed_over(metres, cycles, server[BALL_DECAY]), (x - ball[X]) / metres, (y - ball[Y]) / metres)
-            if fastest_from(scene, path.cos, path.sin, ball[GAIN]) < path.speed:
-                continue
-            next_x, next_y = ball_after(scene, path, 1)
-            if passes_actor(scene, next_x, next_y) and not _overtaken(scene, (x, y), path, cycles):
-                best[VALUE], best[SPEED], best[DIRECTION] = value, path.speed, direction(path.cos, path.sin)
-    return best
+    """Return (COLUMNS,) the safe self pass of the greatest value; VALUE is minus infinity where there is none."""
+    made = _self_passes(scene)
+    for index in by_value(made):
+        one = made[index]
+        angle = math.radians(one[DIRECTION])
+        path = Path(one[SPEED], math.cos(angle), math.sin(angle))
+        if not _overtaken(scene, (one[TO_X], one[TO_Y]), path, int(one[ARRIVES])):
+            return one
+    return nothing()

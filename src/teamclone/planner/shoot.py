@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after, cycles_over, fastest_from
-from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, arrival, first_cycle
+from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, arrival, first_cycles
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
     BALL_DECAY,
     BALL_SPEED_MAX,
+    CYCLES,
     FROZEN,
     GAIN,
     GOAL_X,
@@ -48,72 +52,111 @@ LATE_CYCLES, OTHERS_LATE_CYCLES = 1, 2
 """A goalkeeper, and the others, that are more than so many cycles late do not even come near."""
 NEAR_VALUE, ONE_KICK_VALUE = 100.0, 50.0
 """What is lost if one of them comes near, and if the shot takes several kicks."""
+EQUAL = 0.001
+"""Speeds that differ by less, in metres per cycle, are equal."""
+BEFORE_LINE_M, BEYOND_M = 1.0, 1.5
+"""A player between the posts and this near to the goal line aims so far beyond itself."""
+
+Indices = NDArray[np.int64]
 
 
 @kernel
-def _lateness(scene: Array, path: Path, last: int) -> tuple[int, int]:
-    """Return by how many cycles the goalkeeper and the others miss a shot that is in the goal after ``last``.
+def _mouth(scene: Array) -> tuple[float, Array]:
+    """Return the x that shots are aimed at, and (PLACES,) the y of the places, both metres."""
+    me, ball = scene[ACTOR], scene[BALL]
+    posts = np.array([-GOAL_Y, GOAL_Y])
+    away = np.hypot(GOAL_X - ball[X], posts - ball[Y])
+    inside = np.minimum(INSIDE_MOST_M, INSIDE_M + INSIDE_EACH_M * away)
+    on_line = me[X] > GOAL_X - BEFORE_LINE_M and abs(me[Y]) < GOAL_Y
+    return me[X] + BEYOND_M if on_line else GOAL_X, np.linspace(posts[0] + inside[0], posts[1] - inside[1], PLACES)
 
-    The least of them all; 0 or less if one saves it.
+
+@kernel
+def _defenders(scene: Array) -> Indices:
+    """Return the rows of the opponents that can save a shot."""
+    opponents = scene[OPPONENT:BALL]
+    up = (opponents[:, X] >= SEEN_X) & (np.abs(opponents[:, Y]) <= PENALTY_Y)
+    return OPPONENT + np.flatnonzero(up & (opponents[:, FROZEN] == 0))
+
+
+@kernel
+def _goalkeeper_apart(scene: Array, angle: float) -> float:
+    """Return the degrees between a direction from the ball and that to the goalkeeper, infinite without one."""
+    ball, apart = scene[BALL], np.inf
+    for player in scene[OPPONENT:BALL]:
+        if player[GOALKEEPER] * player[PRESENT] > 0:
+            apart = turned(angle - direction(player[X] - ball[X], player[Y] - ball[Y]))
+    return apart
+
+
+@kernel
+def _lateness(scene: Array, defenders: Indices, path: Path, cycles: int) -> tuple[int, int]:
+    """Return by how many cycles the goalkeeper and the others miss a shot at least; 0 or less where one saves it.
+
+    Args:
+        defenders: rows of the scene. cycles: after which the ball is in the goal.
     """
     me = scene[ACTOR]
-    goalkeeper, others = NEVER_CYCLES, NEVER_CYCLES
-    for opponent in range(OPPONENT, BALL):
-        player = scene[opponent]
-        ahead, _ = along(player[X] - me[X], player[Y] - me[Y], path.cos, path.sin)
-        if player[FROZEN] > 0 or player[X] < SEEN_X or abs(player[Y]) > PENALTY_Y or ahead < 0:
-            continue
-        catches = player[GOALKEEPER] > 0
-        for cycle in range(first_cycle(scene, player, path, SHOT.behind_m), last):
-            place = ball_after(scene, path, cycle)
-            if catches and in_their_area(place[0], place[1]):
-                goalkeeper = min(goalkeeper, arrival(scene, player, place, cycle, SHOT_GOALKEEPER) - cycle)
+    first = first_cycles(scene, defenders, path, SHOT.behind_m)
+    for place, row in enumerate(defenders):
+        if along(scene[row, X] - me[X], scene[row, Y] - me[Y], path.cos, path.sin)[0] < 0:
+            first[place] = NEVER_CYCLES
+    late = NEVER_CYCLES, NEVER_CYCLES
+    for cycle in range(1, min(cycles, CYCLES)):
+        at = ball_after(scene, path, cycle)
+        hands = in_their_area(at[0], at[1])
+        for place, row in enumerate(defenders):
+            if first[place] > cycle:
+                continue
+            if hands and scene[row, GOALKEEPER] > 0:
+                late = min(late[0], arrival(scene, scene[row], at, cycle, SHOT_GOALKEEPER) - cycle), late[1]
             else:
-                others = min(others, arrival(scene, player, place, cycle, SHOT) - cycle)
-            if goalkeeper <= 0 or others <= 0:
-                return goalkeeper, others
-    return goalkeeper, others
+                late = late[0], min(late[1], arrival(scene, scene[row], at, cycle, SHOT) - cycle)
+        if min(late) <= 0:
+            break
+    return late
 
 
 @kernel
 def best_shot(scene: Array) -> tuple[float, float, float, float]:
-    """Return where to and how fast, and the speed that one kick gives; a speed of 0 where there is no shot."""
+    """Return where to and how fast, and the speed that one kick gives; a speed of 0 where there is no shot.
+
+    The value of a place is at most that of a shot for which all are late. Places are looked at from the greatest such
+    value on, until none can be better than what is found.
+    """
     me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
     if gap(GOAL_X, 0.0, me[X], me[Y]) > FROM_M:
         return 0.0, 0.0, 0.0, 0.0
-    goal_x, low, high = GOAL_X, -GOAL_Y, GOAL_Y
-    low += min(INSIDE_MOST_M, INSIDE_M + INSIDE_EACH_M * gap(goal_x, low, ball[X], ball[Y]))
-    high -= min(INSIDE_MOST_M, INSIDE_M + INSIDE_EACH_M * gap(goal_x, high, ball[X], ball[Y]))
-    if me[X] > GOAL_X - 1.0 and abs(me[Y]) < GOAL_Y:
-        goal_x = me[X] + 1.5
-    goalkeeper_at, guarded = 0.0, False
-    for opponent in range(OPPONENT, BALL):
-        player = scene[opponent]
-        if player[GOALKEEPER] > 0 and player[PRESENT] > 0:
-            guarded, goalkeeper_at = True, direction(player[X] - ball[X], player[Y] - ball[Y])
-    best, best_y, best_speed, best_one = 0.0, 0.0, 0.0, 0.0
-    fastest = server[BALL_SPEED_MAX]
-    for index in range(PLACES):
-        y = low + (high - low) / (PLACES - 1) * index
-        metres, angle = gap(goal_x, y, ball[X], ball[Y]), direction(goal_x - ball[X], y - ball[Y])
-        cos, sin = (goal_x - ball[X]) / metres, (y - ball[Y]) / metres
-        one = fastest_from(scene, cos, sin, ball[GAIN])
-        speed = max((metres + PAST_M) * (1.0 - server[BALL_DECAY]), one, SLOWEST)
-        last = False
-        while not last:
-            if speed > fastest - 0.001:
-                speed, last = fastest, True
-            cycles = cycles_over(metres, speed, server[BALL_DECAY])
-            goalkeeper, others = _lateness(scene, Path(speed, cos, sin), cycles)
-            if goalkeeper > 0 and others > 0:
-                late, others_late = goalkeeper > LATE_CYCLES, others > OTHERS_LATE_CYCLES
-                value = 1.0 + ONE_KICK_VALUE * (speed <= one + 0.001) + NEAR_VALUE * (late + others_late)
-                if guarded:
-                    value *= 1.0 - gaussian(turned(angle - goalkeeper_at), LATE_DEG if late else GOALKEEPER_DEG)
-                if metres > FAR_M:
-                    value *= gaussian(max(0.0, abs(y) - WIDE_Y), GOAL_Y - INSIDE_MOST_M)
-                if value > best:
-                    best, best_y, best_speed, best_one = value, y, speed, one
-                last |= late and others_late
-            speed += FASTER
-    return goal_x, best_y, best_speed, best_one
+    x, places = _mouth(scene)
+    metres = np.hypot(x - ball[X], places - ball[Y])
+    cos, sin = (x - ball[X]) / metres, (places - ball[Y]) / metres
+    one_kick, by_place, beside = np.empty(PLACES), np.empty(PLACES), np.empty((PLACES, 2))
+    for place in range(PLACES):
+        one_kick[place] = fastest_from(scene, cos[place], sin[place], ball[GAIN])
+        wide = max(0.0, abs(places[place]) - WIDE_Y) if metres[place] > FAR_M else 0.0
+        by_place[place] = gaussian(wide, GOAL_Y - INSIDE_MOST_M)
+        apart = _goalkeeper_apart(scene, direction(cos[place], sin[place]))
+        beside[place] = 1.0 - gaussian(apart, GOALKEEPER_DEG), 1.0 - gaussian(apart, LATE_DEG)
+    fastest, defenders = server[BALL_SPEED_MAX], _defenders(scene)
+    slowest = np.maximum(np.maximum(one_kick, SLOWEST), (metres + PAST_M) * (1.0 - server[BALL_DECAY]))
+    bound = (1.0 + ONE_KICK_VALUE * (slowest <= one_kick + EQUAL) + 2.0 * NEAR_VALUE) * by_place * beside[:, 1]
+    values, speeds = np.zeros(PLACES), np.zeros(PLACES)
+    for place in np.argsort(-bound, kind="mergesort"):
+        if bound[place] < values.max():
+            break
+        steps = max(0, 1 + int((fastest - EQUAL - slowest[place]) / FASTER))
+        for step in range(steps + 1):
+            speed = slowest[place] + FASTER * step if step < steps else fastest
+            cycles = cycles_over(metres[place], speed, server[BALL_DECAY])
+            late, others = _lateness(scene, defenders, Path(speed, cos[place], sin[place]), cycles)
+            if min(late, others) <= 0:
+                continue
+            far_late, others_far = late > LATE_CYCLES, others > OTHERS_LATE_CYCLES
+            value = 1.0 + ONE_KICK_VALUE * (speed <= one_kick[place] + EQUAL) + NEAR_VALUE * (far_late + others_far)
+            value *= by_place[place] * beside[place, int(far_late)]
+            if value > values[place]:
+                values[place], speeds[place] = value, speed
+            if far_late and others_far:  # no harder shot is worth more
+                break
+    best = np.argmax(values)
+    return x, places[best], speeds[best], one_kick[best]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
-from teamclone.planner.ball import NEVER_CYCLES, Path, cycles_over
+import numpy as np
+
+from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after, cycles_over
 from teamclone.planner.players import (
     HARDLY_M,
     TACKLE,
-    first_cycle,
-    intercept,
+    arrival,
+    first_cycles,
     tackle_chance,
 )
 from teamclone.planner.scene import (
@@ -46,8 +48,12 @@ DIRECTIONS = 40
 """Evenly around the body; the first one is straight back."""
 BEHIND_CYCLES = 10
 """Cycles after which an opponent behind the ball may come, too."""
-SHOT_M = 20.0
-"""How near to the goal a tackle may be a shot."""
+SHOT_M, OWN_POST_M = 20.0, 1.0
+"""How near to the goal a tackle may be a shot; how far outside the own posts the ball counts as going in."""
+GOAL_VALUE, VALUE = 1e6, 1e4
+"""Of a ball in the goal, and of any other, at most."""
+AT_LINE_M = 0.1
+"""A ball so near to the side line is as good as out."""
 GOAL_DEG, LINE_M, LATE_CYCLES = 40.0, 0.7 * LINE_Y, 30.0
 """Widths of the Gaussians by which it is worse to hit the ball towards the own goal, worse towards the middle, and
 worse to where opponents soon are."""
@@ -66,43 +72,56 @@ def _opponents_after(scene: Array, path: Path) -> int:
     """Return the cycles until the first opponent has the ball, NEVER_CYCLES if none has it before it is out."""
     ball = scene[BALL]
     out = cycles_over(_edge_m(ball[X], ball[Y], path.cos, path.sin), path.speed, scene[SERVER, BALL_DECAY])
-    last, soonest = min(CYCLES, out) - 1, NEVER_CYCLES
-    for opponent in range(OPPONENT, BALL):
-        player = scene[opponent]
-        if player[PRESENT] == 0:
-            continue
-        first = first_cycle(scene, player, path, TACKLE.behind_m)
-        if first == NEVER_CYCLES:
-            first = BEHIND_CYCLES
-        cycle = intercept(scene, player, path, (first, last), TACKLE)
-        if cycle < soonest:
-            soonest, last = cycle, cycle - 1
-    return soonest
+    rows = OPPONENT + np.flatnonzero(scene[OPPONENT:BALL, PRESENT])
+    first = first_cycles(scene, rows, path, TACKLE.behind_m)
+    first[first == NEVER_CYCLES] = BEHIND_CYCLES
+    for cycle in range(1, min(CYCLES, out)):
+        place = ball_after(scene, path, cycle)
+        for row in rows[first <= cycle]:
+            if arrival(scene, scene[row], place, cycle, TACKLE) <= cycle:
+                return cycle
+    return NEVER_CYCLES
 
 
 @kernel
-def _value(scene: Array, vx: float, vy: float) -> float:
-    """Return the value of a ball with this velocity: highest in the goal, else away from the own one, to the side, and
-    late with an opponent."""
+def _goal_value(scene: Array, path: Path) -> float:
+    """Return the value of a ball that rolls into a goal: positive in theirs, the less the harder in the own one.
+
+    Minus infinity of a ball that does not.
+    """
     ball, server = scene[BALL], scene[SERVER]
-    speed = max(math.hypot(vx, vy), 1e-9)
-    cos, sin = vx / speed, vy / speed
-    end_x = ball[X] + vx / (1.0 - server[BALL_DECAY])
-    fast = gaussian(speed, 0.5 * server[BALL_SPEED_MAX])
-    if end_x > GOAL_X and gap(GOAL_X, 0.0, ball[X], ball[Y]) < SHOT_M:
-        y = ball[Y] + vy / vx * (GOAL_X - ball[X])
-        if abs(y) < GOAL_Y:
-            return 1e6 * (1.0 - fast) * gaussian(y, 2.0 * GOAL_Y)
-    if end_x < -GOAL_X:
-        y = ball[Y] + vy / vx * (-GOAL_X - ball[X])
-        if abs(y) < GOAL_Y + 1.0:
-            return 1e4 * (fast - gaussian(abs(y) - GOAL_Y, GOAL_Y))
-    cycles = _opponents_after(scene, Path(speed, cos, sin))
-    way_m = min(speed * roll(cycles, server[BALL_DECAY]), _edge_m(ball[X], ball[Y], cos, sin))
-    off = turned(direction(-GOAL_X - ball[X], -ball[Y]) - direction(vx, vy))
-    to_line = max(0.0, LINE_Y - 0.1 - abs(ball[Y] + way_m * sin))
-    aside = gaussian(to_line + 0.1, LINE_M) if to_line > 0 else 1.0
-    return 1e4 * (1.0 - gaussian(off, GOAL_DEG)) * aside * (1.0 - gaussian(cycles, LATE_CYCLES))
+    theirs = path.cos > 0
+    line_x = GOAL_X if theirs else -GOAL_X
+    metres = (line_x - ball[X]) / path.cos
+    y = ball[Y] + metres * path.sin
+    mouth = GOAL_Y if theirs else GOAL_Y + OWN_POST_M
+    rolls_in = metres * (1.0 - server[BALL_DECAY]) < path.speed and abs(y) < mouth
+    if not rolls_in or (theirs and gap(line_x, 0.0, ball[X], ball[Y]) >= SHOT_M):
+        return -math.inf
+    slow = gaussian(path.speed, 0.5 * server[BALL_SPEED_MAX])
+    if theirs:
+        return GOAL_VALUE * (1.0 - slow) * gaussian(y, 2.0 * GOAL_Y)
+    return VALUE * (slow - gaussian(abs(y) - GOAL_Y, GOAL_Y))
+
+
+@kernel
+def _away_value(scene: Array, path: Path) -> float:
+    """Return the value of a direction by how far it is off the own goal's, the most that `_clear_value` can be."""
+    ball = scene[BALL]
+    off = turned(direction(-GOAL_X - ball[X], -ball[Y]) - direction(path.cos, path.sin))
+    return VALUE * (1.0 - gaussian(off, GOAL_DEG))
+
+
+@kernel
+def _clear_value(scene: Array, path: Path) -> float:
+    """Return the value of a ball that rolls into no goal: away from the own one, to the side, late with an opponent."""
+    ball = scene[BALL]
+    cycles = _opponents_after(scene, path)
+    rolled = path.speed * roll(cycles, scene[SERVER, BALL_DECAY])
+    y = ball[Y] + path.sin * min(rolled, _edge_m(ball[X], ball[Y], path.cos, path.sin))
+    inside = LINE_Y - abs(y)
+    sideways = 1.0 if inside <= AT_LINE_M else gaussian(inside, LINE_M)
+    return _away_value(scene, path) * sideways * (1.0 - gaussian(cycles, LATE_CYCLES))
 
 
 @kernel
@@ -124,17 +143,31 @@ def tackle_speed(server: Array, degrees: float, off: float) -> float:
 
 
 @kernel
-def best_tackle(scene: Array) -> float:
-    """Return the degrees from the body of the tackle of the greatest value."""
+def _tackled(scene: Array, degrees: float) -> Path:
+    """Return how the ball leaves a tackle in a direction from the body."""
     me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
     off = direction(ball[X] - me[X], ball[Y] - me[Y]) - me[BODY]
-    best, chosen = -math.inf, 0.0
+    added, angle = tackle_speed(server, degrees, off), math.radians(me[BODY] + degrees)
+    vx, vy = ball[VX] + added * math.cos(angle), ball[VY] + added * math.sin(angle)
+    speed = max(math.hypot(vx, vy), 1e-9)
+    return Path(min(speed, server[BALL_SPEED_MAX]), vx / speed, vy / speed)
+
+
+@kernel
+def best_tackle(scene: Array) -> float:
+    """Return the degrees from the body of the tackle of the greatest value.
+
+    When opponents have the ball is only found out for directions that may be better than the best so far.
+    """
+    degrees = 360.0 / DIRECTIONS * np.arange(DIRECTIONS) - 180.0
+    values, bounds = np.empty(DIRECTIONS), np.full(DIRECTIONS, -np.inf)
     for index in range(DIRECTIONS):
-        degrees = 360.0 / DIRECTIONS * index - 180.0
-        added, angle = tackle_speed(server, degrees, off), math.radians(me[BODY] + degrees)
-        vx, vy = ball[VX] + added * math.cos(angle), ball[VY] + added * math.sin(angle)
-        over = max(1.0, math.hypot(vx, vy) / server[BALL_SPEED_MAX])
-        value = _value(scene, vx / over, vy / over)
-        if value > best:
-            best, chosen = value, degrees
-    return chosen
+        path = _tackled(scene, degrees[index])
+        values[index] = _goal_value(scene, path)
+        if values[index] == -np.inf:
+            bounds[index] = _away_value(scene, path)
+    for index in np.argsort(-bounds, kind="mergesort"):
+        if bounds[index] < values.max() or bounds[index] == -np.inf:
+            break
+        values[index] = _clear_value(scene, _tackled(scene, degrees[index]))
+    return float(degrees[np.argmax(values)])

@@ -35,7 +35,7 @@ def network_seconds(clone: tc.LoadedClone, match: tc.Match, side: int) -> float:
             inputs = model.features(state)
             kicks = torch.from_numpy(np.flatnonzero(near[part]))
             began = time.perf_counter()
-            model.answer_inputs(inputs, kicks=kicks)
+            model.answer_inputs(inputs, kick_rows=kicks)
             seconds += time.perf_counter() - began
     return seconds
 

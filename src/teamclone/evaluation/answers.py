@@ -66,9 +66,9 @@ def answers(
                 kicks = kicks_of(part).to(device)
             given = inputs_of(part).to(device)
             if isinstance(given, State):
-                answer = model.answer(given, kicks=kicks)
+                answer = model.answer(given, kick_rows=kicks)
             else:
-                answer = model.answer_inputs(model.inputs.normalise(given), kicks=kicks)
+                answer = model.answer_inputs(model.inputs.normalise(given), kick_rows=kicks)
             point = answer.point()
             log_loss = np.full(part.stop - part.start, np.nan, np.float32)
             if target is not None and answer.has_density:

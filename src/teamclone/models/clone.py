@@ -66,8 +66,8 @@ class EgocentricTrunk(nn.Module):
             width = config.kick_attention
             self.players = PlayerEncoder(width, config.kick_hidden[-1]) if width else None
 
-    def forward(self, packed: Tensor, *, kicks: Tensor | None = None) -> TrunkOutput:
-        """Return features of the command and its parameters; ``kicks`` as in `Clone.answer_inputs`."""
+    def forward(self, packed: Tensor, *, kick_rows: Tensor | None = None) -> TrunkOutput:
+        """Return features of the command and its parameters; ``kick_rows`` as in `Clone.answer_inputs`."""
         inputs = self.layout.unpack(packed)
         targets, bearing, power = self.targets(inputs.columns.index_select(1, self.target_columns), inputs.geometry)
         seen = torch.cat([inputs.columns.index_select(1, self.command_columns), targets], 1)
@@ -75,8 +75,8 @@ class EgocentricTrunk(nn.Module):
         parameters, at_ball = hidden[:0], KickFeatures(hidden[:0], self.layout.unpack(packed[:0]), None)
         if self.answers:
             parameters = self.parameters_of(torch.cat([seen, hidden], 1).detach())
-            at_ball = self.at_ball(packed if kicks is None else packed.index_select(0, kicks))
-        return TrunkOutput(hidden, parameters, at_ball, kicks, inputs.geometry, bearing, power)
+            at_ball = self.at_ball(packed if kick_rows is None else packed.index_select(0, kick_rows))
+        return TrunkOutput(hidden, parameters, at_ball, kick_rows, inputs.geometry, bearing, power)
 
     def at_ball(self, packed: Tensor) -> KickFeatures:
         """Return the features of kicks and tackles; they share no weights with the layers of the command."""
@@ -130,22 +130,22 @@ class Clone(nn.Module):
         """The inputs of the model, with their normalisation."""
         return cast(Features, self.features)
 
-    def answer(self, state: State, *, kicks: Tensor | None = None) -> Answer:
-        """Return the answer to a state; ``kicks`` as in `answer_inputs`."""
-        return self.answer_inputs(self.features(state), kicks=kicks)
+    def answer(self, state: State, *, kick_rows: Tensor | None = None) -> Answer:
+        """Return the answer to a state; ``kick_rows`` as in `answer_inputs`."""
+        return self.answer_inputs(self.features(state), kick_rows=kick_rows)
 
-    def answer_inputs(self, inputs: Tensor, *, kicks: Tensor | None = None) -> Answer:
+    def answer_inputs(self, inputs: Tensor, *, kick_rows: Tensor | None = None) -> Answer:
         """Return the answer to inputs that the features have made of a state.
 
         Args:
             inputs: (batch, columns) normalised.
-            kicks: (n,) indices of the situations whose kicks and tackles are wanted; None for all. Leaving out the
+            kick_rows: (n,) indices of the situations whose kicks and tackles are wanted; None for all. Leaving out the
                 others saves most of the time. A point head always answers all.
         """
-        if kicks is None or not isinstance(self.config, EgocentricConfig):
+        if kick_rows is None or not isinstance(self.config, EgocentricConfig):
             answer: Answer = self.head(self.trunk(inputs))
         else:
-            answer = self.head(self.trunk(inputs, kicks=kicks))
+            answer = self.head(self.trunk(inputs, kick_rows=kick_rows))
         return answer
 
     def loss(self, answer: Any, target: Target, *, balance: Balance | None = None, whole: Tensor | None = None) -> Loss:
@@ -163,7 +163,7 @@ class Clone(nn.Module):
             inputs: (batch, columns) normalised. target: kicks and tackles only.
         """
         head, trunk = cast(MixtureHead, self.head), cast(EgocentricTrunk, self.trunk)
-        return self.config.parameter_weight * head.kick_loss(head.kicks(trunk.at_ball(inputs)), target, of=of)
+        return self.config.parameter_weight * head.kick_loss(head.kick_answers(trunk.at_ball(inputs)), target, of=of)
 
     def forward(self, state: State) -> Prediction:
         """Return the likeliest answer to a state."""

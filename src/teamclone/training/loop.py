@@ -114,7 +114,7 @@ def _train_epoch(setup: Setup, epoch: int, on_progress: Callable[[Progress], Non
     for batch, (inputs, target, whole) in every:
         for weights in optimiser.param_groups:
             weights["lr"] = learning_rate(config.train, epoch=epoch, batch=batch, batches=batches)
-        answered = answer(model, inputs, precision=setup.precision, kicks=with_ball(target))
+        answered = answer(model, inputs, precision=setup.precision, kick_rows=with_ball(target))
         loss = model.loss(answered, target, balance=setup.balance, whole=whole)
         error = loss.total
         for kick_inputs, kick_target, whole_kicks in islice(kicks, 1):
@@ -139,7 +139,7 @@ def _validate(setup: Setup) -> dict[str, Any]:
     model.eval()
     metrics, calibration = RunningMetrics(setup.device, commands), Calibration(setup.device, commands)
     for inputs, target, whole in setup.batches.batches(setup.validation_rows, config.data.batch_size):
-        answered = answer(model, inputs, precision=setup.precision, kicks=with_ball(target))
+        answered = answer(model, inputs, precision=setup.precision, kick_rows=with_ball(target))
         loss = model.loss(answered, target, whole=whole)
         metrics.add(loss, answered.point(), target, batch=len(whole))
         if config.train.calibrate:
@@ -153,18 +153,20 @@ def _validate(setup: Setup) -> dict[str, Any]:
     return record
 
 
-def answer(model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kicks: Tensor | None = None) -> Answer:
-    """Return the answer to normalised inputs, equal to `Clone.answer_inputs` but for rounding; ``kicks`` as there."""
+def answer(
+    model: Clone, inputs: Tensor, *, precision: Literal["fp32", "bf16"], kick_rows: Tensor | None = None
+) -> Answer:
+    """Return the answer to normalised inputs, that of `Clone.answer_inputs` but for rounding."""
     if precision == "bf16":
         with torch.autocast(inputs.device.type, torch.bfloat16):
-            return model.answer_inputs(inputs, kicks=kicks)
+            return model.answer_inputs(inputs, kick_rows=kick_rows)
     able = isinstance(model.trunk, nn.Sequential) and model.config.activation in ONEDNN_ACTIVATIONS
     if able and inputs.device.type == "cpu" and len(inputs) and not model.config.dropout:
         # oneDNN instead of MKL, which takes twice the time on AMD, where it leaves AVX-512 unused.
         hidden: Tensor = model.trunk(inputs.to_mkldnn()).to_dense()
         answered: Answer = model.head(hidden)
         return answered
-    return model.answer_inputs(inputs, kicks=kicks)
+    return model.answer_inputs(inputs, kick_rows=kick_rows)
 
 
 def _epoch_rows(setup: Setup, epoch: int) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:

@@ -238,6 +238,6 @@ def test_an_ensemble_draws_parameters_of_each_member() -> None:
 
 def test_an_answer_without_all_kicks_is_not_sampled() -> None:
     with torch.no_grad():
-        answer = clone_of(MIXTURE).answer(situations(4), kicks=torch.tensor([1]))
-    with pytest.raises(ValueError, match="without kicks="):
+        answer = clone_of(MIXTURE).answer(situations(4), kick_rows=torch.tensor([1]))
+    with pytest.raises(ValueError, match="without kick_rows="):
         answer.sample(generator())

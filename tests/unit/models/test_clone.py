@@ -301,7 +301,7 @@ def test_kicks_may_be_answered_where_they_are_asked_for(config: ModelConfig) -> 
     rows = with_ball(target)
     assert rows.tolist() == [row for row in range(40) if row % 4 >= 2]
     with torch.no_grad():
-        whole, asked = model.answer_inputs(inputs), model.answer_inputs(inputs, kicks=rows)
+        whole, asked = model.answer_inputs(inputs), model.answer_inputs(inputs, kick_rows=rows)
         likelihoods = [output.log_likelihood(target) for output in (whole, asked)]
         losses = [torch.stack(model.loss(output, target)) for output in (whole, asked)]
         points = [output.point() for output in (whole, asked)]
@@ -321,7 +321,7 @@ def test_a_batch_without_kicks_learns(config: ModelConfig) -> None:
     state = situations(12)
     target = likely_target(state)._replace(kind=torch.arange(12) % 2)
     model.inputs.fit([model.inputs.project(state)])
-    loss = model.loss(model.answer_inputs(model.features(state), kicks=with_ball(target)), target)
+    loss = model.loss(model.answer_inputs(model.features(state), kick_rows=with_ball(target)), target)
     whole = model.loss(model.answer(state), target)
     assert loss.total.item() == pytest.approx(whole.total.item(), rel=1e-4)
     loss.total.backward()

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.models.answer import Answer, Prediction
-from teamclone.models.heads.mixture import Kick, MixtureHead
+from teamclone.models.heads.mixture import KickAnswer, MixtureHead
 from teamclone.models.heads.point import PointHead
 from teamclone.models.heads.trunk_output import KickFeatures
 from teamclone.models.loss import Balance, Loss
@@ -82,11 +82,11 @@ class EnsembleHead(nn.Module):
         answers = [member(of) for member, of in zip(self.members, seen, strict=True)]
         return EnsembleAnswer(answers, self._first.merged, self.temperature)
 
-    def kicks(self, seen: Sequence[KickFeatures]) -> list[tuple[Kick, Kick]]:
+    def kick_answers(self, seen: Sequence[KickFeatures]) -> list[tuple[KickAnswer, KickAnswer]]:
         """Return the answers on kicks and tackles of each member, which must be a `MixtureHead`."""
-        return [cast(MixtureHead, member).kicks(of) for member, of in zip(self.members, seen, strict=True)]
+        return [cast(MixtureHead, member).kick_answers(of) for member, of in zip(self.members, seen, strict=True)]
 
-    def kick_loss(self, kicks: Sequence[Sequence[Kick]], target: Target, *, of: int) -> Tensor:
+    def kick_loss(self, kicks: Sequence[Sequence[KickAnswer]], target: Target, *, of: int) -> Tensor:
         """Return the mean of the members' errors, see `MixtureHead.kick_loss`."""
         return torch.stack([self._first.kick_loss(answers, target, of=of) for answers in kicks]).mean()
 

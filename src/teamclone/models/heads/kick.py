@@ -75,7 +75,7 @@ class Planned(nn.Module):
             )
 
 
-class Kicks(nn.Module):
+class KickMixture(nn.Module):
     """Mixtures of power and direction of a kick; both share the weights of their components.
 
     There are N_COMPONENTS, and with ``planned`` those of `Planned`.

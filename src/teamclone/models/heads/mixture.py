@@ -23,7 +23,7 @@ from teamclone.models.distributions import (
     mean_logits,
     wrap,
 )
-from teamclone.models.heads.kick import Kicks
+from teamclone.models.heads.kick import KickMixture
 from teamclone.models.heads.trunk_output import KickFeatures, TrunkOutput
 from teamclone.models.inputs.geometry import geometry_of
 from teamclone.models.loss import Balance, Loss, mixture_loss
@@ -56,7 +56,7 @@ TARGET_SCALE_DEG = 4.0
 """Scale of the logistic density by which a turn teaches the target points near its direction."""
 
 
-class Kick(NamedTuple):
+class KickAnswer(NamedTuple):
     """One answer on what a kick or tackle would be: power, radians, (kicks, TACKLE_DIRECTIONS) logits."""
 
     power: Mixture
@@ -80,7 +80,7 @@ class ActionDistribution(NamedTuple):
         turn_factor: (batch,) turn moment for one degree.
         turn_to_targets: the turn, by the target points alone: only they learn from it.
         kick: several answers of which the mean counts.
-        kicks: (kicks,) of which situations they are; None for all.
+        kick_rows: (kicks,) of which situations they are; None for all.
         catch: (batch, CATCH_DIRECTIONS) logits. move: a place. None where this is no command of the model.
     """
 
@@ -90,8 +90,8 @@ class ActionDistribution(NamedTuple):
     turn: Mixture
     turn_factor: Tensor
     turn_to_targets: Mixture
-    kick: tuple[Kick, ...]
-    kicks: Tensor | None
+    kick: tuple[KickAnswer, ...]
+    kick_rows: Tensor | None
     catch: Tensor | None
     move: Move | None
 
@@ -146,8 +146,8 @@ class MixtureAnswer(Answer):
             ValueError: the answer leaves out kicks.
         """
         of = self.distribution
-        if of.kicks is not None:
-            raise ValueError("cannot sample an answer that leaves out kicks; ask the clone without kicks=")
+        if of.kick_rows is not None:
+            raise ValueError("cannot sample an answer that leaves out kicks; ask the clone without kick_rows=")
         kick, nothing = _mean_kick(of.kick), torch.zeros_like(of.turn_factor)
         power = mixture.draw_component(of.dash_power.logits, generator)
         turn, kicked = (mixture.draw_component(one.logits, generator) for one in (of.turn, kick.power))
@@ -179,7 +179,7 @@ class MixtureHead(nn.Module):
     """Command probabilities, and for each command a distribution of its parameters.
 
     Components depend on what a player may want: to face the ball, the place where it is met, or a target point; to come
-    to rest there; to spend a multiple of the stamina recovered in a cycle; to kick by one of `heads.kick.Kicks`. The
+    to rest there; to spend a multiple of the stamina recovered in a cycle; to kick as in `heads.kick.KickMixture`. The
     network gives their shares, small corrections and scales.
 
     A parameter known to a hundredth of a degree pulls a thousand times harder than a command; so the layers that they
@@ -188,7 +188,7 @@ class MixtureHead(nn.Module):
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
             kicks are, target_width: of what is known of each player or goal to kick to. planned: see
-            `heads.kick.Kicks`. target_points: of `layers.targets.TargetPoints`. commands: the command set.
+            `heads.kick.KickMixture`. target_points: of `layers.targets.TargetPoints`. commands: the command set.
         parameter_weight: of the parameters' error beside that of the command. target_weight: of the error by which
             turns teach the target points.
 
@@ -219,7 +219,7 @@ class MixtureHead(nn.Module):
         self.command = nn.Linear(width, len(commands))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
-        self.kick = Kicks(kick_width, target_width, planned=planned)
+        self.kick = KickMixture(kick_width, target_width, planned=planned)
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.planned_tackle = nn.Linear(kick_width, 1) if planned else None
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))
@@ -237,7 +237,7 @@ class MixtureHead(nn.Module):
         """Return the answer to the output of an egocentric trunk."""
         command = self.command(situation.hidden).float()
         dash, turn = (layer(situation.parameters).float() for layer in (self.dash, self.turn))
-        kick = self.kicks(situation.at_ball)
+        kick = self.kick_answers(situation.at_ball)
         with torch.autocast(command.device.type, enabled=False):
             turned, to_targets = self._turn(turn, situation)
             distribution = ActionDistribution(
@@ -248,7 +248,7 @@ class MixtureHead(nn.Module):
                 turn_factor=geometry_of(situation.geometry, "turn_factor")[0][:, 0],
                 turn_to_targets=to_targets,
                 kick=kick,
-                kicks=situation.kicks,
+                kick_rows=situation.kick_rows,
                 catch=self._catch(situation),
                 move=self._move(situation),
             )
@@ -301,7 +301,7 @@ class MixtureHead(nn.Module):
         x_scale, y_scale = (mixture.scale_of(scale, least=LEAST_PLACE, typical=2.0) for scale in raw[2:])
         return Move(Mixture(logits, x, x_scale), Mixture(logits, y, y_scale))
 
-    def kicks(self, seen: KickFeatures) -> tuple[Kick, Kick]:
+    def kick_answers(self, seen: KickFeatures) -> tuple[KickAnswer, KickAnswer]:
         """Return the answers on kicks and tackles: from the situation, and from its mirror image mirrored back."""
         both = self.kick(*seen)
         tackle = self.tackle(seen.hidden).float()
@@ -314,8 +314,8 @@ class MixtureHead(nn.Module):
         opposite = torch.remainder(-torch.arange(TACKLE_DIRECTIONS, device=tackle.device), TACKLE_DIRECTIONS)
         n = tackle.shape[0] // 2
         return (
-            Kick(power, direction, tackle[:n]),
-            Kick(power_mirrored, mixture.mirrored(direction_mirrored), tackle[n:, opposite]),
+            KickAnswer(power, direction, tackle[:n]),
+            KickAnswer(power_mirrored, mixture.mirrored(direction_mirrored), tackle[n:, opposite]),
         )
 
     def merged(self, answers: Sequence[MixtureAnswer]) -> MixtureAnswer:
@@ -331,7 +331,7 @@ class MixtureHead(nn.Module):
                 turn_factor=of[0].turn_factor,
                 turn_to_targets=mixture.merged([one.turn_to_targets for one in of]),
                 kick=tuple(kick for one in of for kick in one.kick),
-                kicks=of[0].kicks,
+                kick_rows=of[0].kick_rows,
                 catch=mean_logits(catches) if catches else None,
                 move=_mean_move(moves) if moves else None,
             ),
@@ -368,7 +368,7 @@ class MixtureHead(nn.Module):
         )
 
     @staticmethod
-    def kick_loss(kicks: Sequence[Kick], target: Target, *, of: int) -> Tensor:
+    def kick_loss(kicks: Sequence[KickAnswer], target: Target, *, of: int) -> Tensor:
         """Return the error of kicks and tackles alone, summed and divided by ``of``; each answer counts by itself."""
         likelihood = _kick_likelihood(kicks, target.parameters)
         kind = (target.kind == WITH_BALL[1]).long()
@@ -381,8 +381,8 @@ def with_ball(target: Target) -> Tensor:
     return torch.nonzero((target.kind == kick) | (target.kind == tackle)).squeeze(1)
 
 
-def _mean_kick(kicks: Sequence[Kick]) -> Kick:
-    return Kick(
+def _mean_kick(kicks: Sequence[KickAnswer]) -> KickAnswer:
+    return KickAnswer(
         power=mixture.merged([kick.power for kick in kicks]),
         direction=mixture.merged([kick.direction for kick in kicks]),
         tackle=mean_logits([kick.tackle for kick in kicks]),
@@ -395,12 +395,12 @@ def _mean_move(moves: Sequence[Move]) -> Move:
 
 def _spread(values: Tensor, output: ActionDistribution) -> Tensor:
     """(batch, ...) values of the situations whose kick was asked for, 0 for the others."""
-    if output.kicks is None:
+    if output.kick_rows is None:
         return values
-    return values.new_zeros(output.logits.shape[0], *values.shape[1:]).index_copy(0, output.kicks, values)
+    return values.new_zeros(output.logits.shape[0], *values.shape[1:]).index_copy(0, output.kick_rows, values)
 
 
-def _kick_likelihood(answers: Sequence[Kick], parameters: Tensor) -> Tensor:
+def _kick_likelihood(answers: Sequence[KickAnswer], parameters: Tensor) -> Tensor:
     """(kicks, 2) log-likelihood of (kicks, 2) parameters as those of a kick and of a tackle, the mean of answers."""
     first, second = parameters[:, 0], parameters[:, 1]
     each = []
@@ -411,9 +411,9 @@ def _kick_likelihood(answers: Sequence[Kick], parameters: Tensor) -> Tensor:
     return torch.stack(each).mean(0)
 
 
-def _chosen(output: ActionDistribution, target: Target, answers: Sequence[Kick]) -> Tensor:
+def _chosen(output: ActionDistribution, target: Target, answers: Sequence[KickAnswer]) -> Tensor:
     """(batch,) log-likelihood of the parameters of the command given, of a kick as the mean of ``answers``."""
-    of_kicks = target.parameters if output.kicks is None else target.parameters[output.kicks]
+    of_kicks = target.parameters if output.kick_rows is None else target.parameters[output.kick_rows]
     kick = _spread(_kick_likelihood(answers, of_kicks), output)
     first, second = target.parameters[:, 0], target.parameters[:, 1]
     dash = mixture.log_likelihood(output.dash_power.logits, mixture.power_terms(output.dash_power, first))

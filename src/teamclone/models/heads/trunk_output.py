@@ -30,7 +30,7 @@ class TrunkOutput(NamedTuple):
         hidden: (batch, width) features of the command.
         parameters: (batch, parameter width) features of dashes and turns; empty where the head has no use for them.
         at_ball: features of kicks and tackles; empty where the head has no use for them.
-        kicks: (kicks,) indices of the situations that ``at_ball`` describes; None for all.
+        kick_rows: (kicks,) indices of the situations that ``at_ball`` describes; None for all.
         geometry: (batch, len(GEOMETRY)).
         bearing: (batch, targets) radians from the body to each of the `TargetPoints`.
         power: (batch, targets) dash power towards each of them.
@@ -39,7 +39,7 @@ class TrunkOutput(NamedTuple):
     hidden: Tensor
     parameters: Tensor
     at_ball: KickFeatures
-    kicks: Tensor | None
+    kick_rows: Tensor | None
     geometry: Tensor
     bearing: Tensor
     power: Tensor

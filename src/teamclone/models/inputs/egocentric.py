@@ -67,7 +67,7 @@ class EgocentricFeatures(nn.Module):
     """The columns of the chosen blocks, normalised and limited, then the other parts of `Inputs` as they are.
 
     Args:
-        blocks: some of BLOCKS; ``scene`` is always among the columns, and tackle and ways are with ``plan``.
+        blocks: some of BLOCKS; ``core`` is always among the columns, and tackle and ways are with ``plan``.
         others: have OTHER of all OTHERS.
 
     Attributes:
@@ -90,7 +90,7 @@ class EgocentricFeatures(nn.Module):
         self.own_type = TypeParameters(tuple(GROUPS))
         self.register_buffer("mode_column", torch.from_numpy(_MODE_COLUMN), persistent=False)
         blank = ActorView(_blank(self.history))
-        widths = {name: _BLOCKS[name](self, blank).shape[1] for name in ("scene", *self.blocks)}
+        widths = {name: _BLOCKS[name](self, blank).shape[1] for name in ("core", *self.blocks)}
         self.layout = InputLayout(columns=sum(widths.values()), others=others, plan="plan" in self.blocks)
         self.n_inputs = self.layout.columns
         self.names = (
@@ -121,15 +121,13 @@ class EgocentricFeatures(nn.Module):
         return torch.tensor(order)
 
     def columns(self, blocks: tuple[str, ...]) -> list[int]:
-        """Return the places of the columns of ``scene`` and of some blocks."""
-        return [
-            i for i, name in enumerate(self.names[: self.n_inputs]) if name.rpartition("_")[0] in ("scene", *blocks)
-        ]
+        """Return the places of the columns of ``core`` and of some blocks."""
+        return [i for i, name in enumerate(self.names[: self.n_inputs]) if name.rpartition("_")[0] in ("core", *blocks)]
 
     def project(self, state: State) -> Tensor:
         """Return (batch, len(names)) inputs before normalisation."""
         view = ActorView(state)
-        columns = [_BLOCKS[name](self, view) for name in ("scene", *self.blocks)]
+        columns = [_BLOCKS[name](self, view) for name in ("core", *self.blocks)]
         columns.append(_geometry(view))
         if self.others:
             columns.append(_all_others(view))
@@ -153,7 +151,7 @@ class EgocentricFeatures(nn.Module):
         return self.normalise(self.project(state))
 
 
-def _scene(features: EgocentricFeatures, view: ActorView) -> Tensor:
+def _core(features: EgocentricFeatures, view: ActorView) -> Tensor:
     """Return positions on the pitch, the time to meet the ball, and the lines."""
     return torch.cat(
         [
@@ -380,7 +378,7 @@ def _mode(features: EgocentricFeatures, view: ActorView) -> Tensor:
 
 
 _BLOCKS: dict[str, Callable[[EgocentricFeatures, ActorView], Tensor]] = {
-    "scene": _scene,
+    "core": _core,
     "self": _self,
     "role": _role,
     "type": _type,

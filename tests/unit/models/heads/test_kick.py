@@ -22,7 +22,7 @@ from teamclone.models.heads.kick import (
     N_COMPONENTS,
     TOUCH_M,
     USUAL_ERROR,
-    Kicks,
+    KickMixture,
 )
 from teamclone.models.heads.mixture import TACKLE_DIRECTIONS, MixtureHead, class_of
 from teamclone.models.inputs.geometry import GEOMETRY, MATES, InputLayout, Inputs
@@ -50,7 +50,7 @@ def geometry(**values: float) -> Inputs:
 
 def kick(*, component: int = 0, outputs: dict[str, float] | None = None, **values: float) -> list[float]:
     """Power and degrees of a component whose outputs are 0 but for the given ones."""
-    kicks = Kicks(3)
+    kicks = KickMixture(3)
     with torch.no_grad():
         kicks.layer.weight.zero_()
         kicks.layer.bias.zero_()
@@ -142,7 +142,7 @@ def test_powers_beyond_reach_are_bounded() -> None:
 
 
 def test_scales_are_typical() -> None:
-    kicks = Kicks(3)
+    kicks = KickMixture(3)
     with torch.no_grad():
         kicks.layer.weight.zero_()
         kicks.layer.bias.zero_()
@@ -180,7 +180,7 @@ def model(request: pytest.FixtureRequest) -> Clone:
 
 def test_each_way_that_is_planned_is_a_component() -> None:
     """Those that there are; beside them the free ones."""
-    kicks = Kicks(3, planned=True)
+    kicks = KickMixture(3, planned=True)
     ways = {"pass": (1.2, 0.7), "hold": (-0.1, 0.2)}
     with torch.no_grad():
         power, direction = kicks(torch.zeros(1, 3), planned(ways))
@@ -193,7 +193,7 @@ def test_each_way_that_is_planned_is_a_component() -> None:
         else:
             assert power.logits[0, place] == direction.logits[0, place] == IMPOSSIBLE
     # The free ones are as without a plan.
-    alone = Kicks(3)
+    alone = KickMixture(3)
     alone.load_state_dict(kicks.state_dict(), strict=False)
     with torch.no_grad():
         free, _ = alone(torch.zeros(1, 3), geometry(ball_vx=0.3, ball_vy=-0.2))
@@ -202,7 +202,7 @@ def test_each_way_that_is_planned_is_a_component() -> None:
 
 def test_errors_of_what_is_planned_are_of_the_ball_velocity() -> None:
     """The harder a kick, the less a wrong velocity turns it."""
-    kicks = Kicks(3, planned=True)
+    kicks = KickMixture(3, planned=True)
     assert kicks.planned is not None
     with torch.no_grad():
         kicks.planned.error[WAYS.index("pass")] = math.log(2.0)

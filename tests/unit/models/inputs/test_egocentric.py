@@ -28,7 +28,7 @@ from teamclone.world.state import State
 
 SEEN = tuple(block for block in BLOCKS if block != "plan")
 """All but what is planned, which has tests of its own."""
-PARTS = ("scene", *SEEN, "geometry")
+PARTS = ("core", *SEEN, "geometry")
 FEATURES = EgocentricFeatures(SEEN)
 PLAYER = 11
 """Columns of one player in mates, opponents and rivals."""
@@ -67,7 +67,7 @@ def test_names_are_the_columns_and_unique() -> None:
         assert projected.shape == (3, len(features.names))
         assert len(set(features.names)) == len(features.names)
         assert features.names[features.n_inputs :] == (*GEOMETRY, *((*TACKLE, *WAY) if "plan" in blocks else ()))
-        assert {name.rpartition("_")[0] for name in features.names[: features.n_inputs]} == {"scene", *blocks}
+        assert {name.rpartition("_")[0] for name in features.names[: features.n_inputs]} == {"core", *blocks}
 
 
 def test_blocks_keep_their_columns_whatever_else_there_is() -> None:
@@ -76,16 +76,16 @@ def test_blocks_keep_their_columns_whatever_else_there_is() -> None:
     some = EgocentricFeatures(("opponents", "self", "past"))
     assert some.blocks == ("self", "opponents", "past")
     projected = some.project(situations(5, history=PAST_FRAMES))
-    assert torch.equal(projected, torch.cat([part(whole, name) for name in ("scene", *some.blocks, "geometry")], 1))
+    assert torch.equal(projected, torch.cat([part(whole, name) for name in ("core", *some.blocks, "geometry")], 1))
 
 
 def test_columns_finds_blocks() -> None:
     state = situations(2, history=PAST_FRAMES)
     projected = FEATURES.project(state)
     places = FEATURES.columns(("reach", "self"))
-    expected = torch.cat([part(projected, name) for name in ("scene", "self", "reach")], 1)
+    expected = torch.cat([part(projected, name) for name in ("core", "self", "reach")], 1)
     assert torch.equal(projected[:, places], expected)
-    assert FEATURES.columns(()) == list(range(part(projected, "scene").shape[1]))
+    assert FEATURES.columns(()) == list(range(part(projected, "core").shape[1]))
 
 
 def test_inputs_are_normalised_and_limited_and_geometry_stays() -> None:
@@ -177,13 +177,13 @@ def test_ball_at_the_feet() -> None:
     assert got[13:] == pytest.approx([-0.4, 1, -0.2, 1 - (0.985 / 2) ** 6, 0, 0], abs=1e-4)
 
 
-def test_reach_and_scene() -> None:
+def test_reach_and_core() -> None:
     state = resting(history=PAST_FRAMES)
     put(state, 0, x=0)
     put(state, 3, x=-10, y=0)
     put(state, 14, x=30, y=0, body=180)
     state.ball[0, :2] = torch.tensor([10.0, 0.0])
-    got, scene = seen(state, "reach"), seen(state, "scene")
+    got, scene = seen(state, "reach"), seen(state, "core")
     # 10 m less 1.085 take the actor 10 dashes (1 m each less 2/3); the mate 20 m less .885: 20; the opponent 20 m less
     # 1.085: 20. Only to within six are differences told.
     own, mate, opponent = 10, 20, 20
@@ -223,14 +223,14 @@ def test_lines_follow_the_ball() -> None:
     for opponent in (11, 12):
         put(state, opponent, x=10, y=30)
     # In the next cycle the ball is at 27; where somebody first has it is further on.
-    line = seen(state, "scene")[20] * 52.5
+    line = seen(state, "core")[20] * 52.5
     assert line > 27
-    assert line == pytest.approx(52.5 * max(seen(state, "scene")[6 + 2 * place] for place in (3,)), abs=1e-4)
+    assert line == pytest.approx(52.5 * max(seen(state, "core")[6 + 2 * place] for place in (3,)), abs=1e-4)
     # Never behind the middle.
     state.ball[0] = torch.tensor([-30.0, 0.0, 0.0, 0.0])
     put(state, 11, x=-20)
     put(state, 12, x=-20)
-    assert seen(state, "scene")[20] == 0
+    assert seen(state, "core")[20] == 0
 
 
 def test_a_team_mate_who_meets_the_ball_further_on_moves_the_limit() -> None:
@@ -239,7 +239,7 @@ def test_a_team_mate_who_meets_the_ball_further_on_moves_the_limit() -> None:
     put(state, 14, x=4, y=4, body=-90)
     put(state, 3, x=1, y=-9, body=60)
     put(state, 0, x=-30, y=30)
-    scene = seen(state, "scene")
+    scene = seen(state, "core")
     mate, opponent, line, limit = (52.5 * scene[place] for place in (8, 10, 20, 21))
     assert line == pytest.approx(opponent, abs=1e-4)
     assert limit == pytest.approx(mate, abs=1e-4)
@@ -317,7 +317,7 @@ def test_turn_to_meet_is_seen_from_where_he_rolls_out_to() -> None:
     state = resting(history=PAST_FRAMES)
     put(state, 0, x=0, y=0, vy=0.3)
     state.ball[0, :2] = torch.tensor([10.0, 0.0])
-    steps = seen(state, "scene")[14] * 20
+    steps = seen(state, "core")[14] * 20
     rolled = 0.3 * (1 - 0.4**steps) / 0.6
     assert geometry(state)["turn_to_meet"] == pytest.approx(math.atan2(-rolled, 10), abs=1e-6)
 
@@ -403,7 +403,7 @@ def test_what_is_relative_does_not_see_where_on_the_pitch(degrees: float, by: tu
     for name in ("turn_factor", "decay", "dash_gain", "income", "near_m", "kick_gain", "forward", "aside"):
         place = len(FEATURES.names) - len(GEOMETRY) + GEOMETRY.index(name)
         assert torch.allclose(before[:, place], after[:, place], atol=1e-9), name
-    for name in ("scene", "lines"):
+    for name in ("core", "lines"):
         assert not torch.allclose(part(before, name), part(after, name), atol=1e-3)
 
 
@@ -457,7 +457,7 @@ def test_channels_are_those_that_the_blocks_look_at() -> None:
         assert ("neck" in features.channels) == ("view_width" in features.channels) == ("view" in blocks)
 
 
-MEETING = {"scene", "reach", "geometry", "lines", "mates", "opponents", "rivals"}
+MEETING = {"core", "reach", "geometry", "lines", "mates", "opponents", "rivals"}
 """Blocks that hang on times to the ball, which hang on where everybody is."""
 
 
@@ -515,7 +515,7 @@ def test_one_who_tackles_does_not_hold_the_ball() -> None:
     doubt = 0.02 * (math.hypot(1, 1.5) + math.hypot(1, 2))
     assert seen(state, "reach")[5:9] == pytest.approx([0, 0, 1, 0.5 - 1.085 - doubt], abs=1e-5)
     # The ball is taken to stay with him.
-    assert seen(state, "scene")[6:8] == pytest.approx([9 / 52.5, -3 / 34], abs=1e-5)
+    assert seen(state, "core")[6:8] == pytest.approx([9 / 52.5, -3 / 34], abs=1e-5)
     state.players[0, 13, CHANNEL["flags"]] = FLAG_ON_FIELD | FLAG_TACKLING
     assert seen(state, "reach")[5:9] == [0, 0, 0, 1]
     put(state, 6, x=9, y=-3.5)

@@ -92,9 +92,8 @@ def from_table(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any
     if not isinstance(table, dict):
         problems.append(f"{key}: expected a table, got {table!r}")
         table = {}
-    hints = {item.name: get_type_hints(cls)[item.name] for item in fields(cls)}
-    before = len(problems)
-    problems += [f"no setting {key}.{name}; {choose(name, list(hints))}" for name in table if name not in hints]
+    before, hints, names = len(problems), get_type_hints(cls), [item.name for item in fields(cls)]
+    problems += [f"no setting {key}.{name}; {choose(name, names)}" for name in table if name not in names]
     kept: dict[str, Any] = {}
     for item in fields(cls):
         where = f"{key}.{item.name}"

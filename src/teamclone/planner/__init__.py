@@ -2,8 +2,9 @@
 
 The rules and their numbers are those of the public sources of HELIOS Base and of its library librcsc (Akiyama et al.,
 github.com/helios-base) named below, checked against logs. How soon players arrive, what opponents can reach, and how
-safe the ball is are written from the physics of the server. The loops over candidates still go through them in the
-order of those sources.
+safe the ball is are written from the physics of the server. Shots, tackles, dribbles, self
+passes, holding the ball and sequences of kicks are tables of candidates with a value each; the candidates of passes
+(`passes.py`) and the scan of kick sequences (`kick_table._add`) still go in the order of those sources.
 
 helios-base at commit 66fd63d6f9d022423b8c4430668a2b8510353caf (5 October 2025):
 

@@ -14,7 +14,9 @@ def adapt(
     out: Annotated[Path, typer.Option("--out", help="Run folder to make.")],
     overrides: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change one setting of data or train: train.epochs=4."),
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change one setting of data, train or the loss: train.epochs=4."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

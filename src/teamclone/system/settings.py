@@ -120,7 +120,7 @@ def without_effect(settings: Any, key: str, names: Iterable[str], beside: str) -
     """
     usual = {item.name: item.default for item in fields(settings)}
     return [
-        f"{key}.{name} has no effect with {beside}; leave it out"
+        f"{key}.{name} has no effect with {beside}; leave it out, or set it to {toml_value(_plain(usual[name]))}"
         for name in names
         if getattr(settings, name) != usual[name]
     ]

@@ -12,7 +12,7 @@ from teamclone.dataset.reader import open_dataset
 from teamclone.errors import DatasetError, UsageError
 from teamclone.models.clone import model_id
 from teamclone.models.config import LOSS_SETTINGS, EgocentricConfig
-from teamclone.system.settings import assignment
+from teamclone.system.settings import assignment, table_of
 from teamclone.training.config import Config, override
 from teamclone.training.run import Base, Run
 
@@ -43,7 +43,8 @@ def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
         RunError: the base has no CHECKPOINT, or it is damaged.
     """
     keys = [assignment(text)[0] for text in overrides]
-    fixed = [key for key in keys if key.startswith("model.") and key.removeprefix("model.") not in LOSS_SETTINGS]
+    network = {"family", *table_of(base.config.model)} - {*LOSS_SETTINGS}
+    fixed = [key for key in keys if key.startswith("model.") and key.removeprefix("model.") in network]
     if fixed:
         raise UsageError(
             f"--set: {', '.join(fixed)} cannot be changed, an adapted clone has the network of its base; "

@@ -239,7 +239,7 @@ def _flat(table: Mapping[str, Mapping[str, Any]]) -> Iterable[tuple[str, Any]]:
 def _unknown(key: str, table: Mapping[str, Mapping[str, Any]]) -> str:
     """Return what to say of a key that no section has; `choose` would not find `train.epochs` for `epochs`."""
     known = [name for name, _ in _flat(table)]
-    same = [name for name in known if name.partition(".")[2] == key]
+    same = [name for name in known if name.partition(".")[2] == key.rpartition(".")[2]]
     remedy = f"did you mean {' or '.join(same)}?" if same else choose(key, known)
     of = [name for name, one in FAMILIES.items() if key.removeprefix("model.") in {item.name for item in fields(one)}]
     if key.startswith("model.") and of:

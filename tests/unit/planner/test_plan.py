@@ -31,7 +31,7 @@ AREA, EDGES, MARGIN = 1.085, 0.385, 0.7
 def scene(
     *, x: float = 0.0, y: float = 0.0, body: float = 0.0, ball: tuple[float, ...] = (0.6, 0.0, 0.0, 0.0)
 ) -> State:
-    """Player 0 alone on the pitch with the ball at a place seen from him, and its velocity."""
+    """Return a state with player 0 alone on the pitch; the ball has a place seen from the player, and a velocity."""
     state = resting()
     put(state, 0, x=x, y=y, body=body)
     state.ball[0] = torch.tensor(ball) + torch.tensor([x, y, 0.0, 0.0])
@@ -72,7 +72,7 @@ def dashed(count: int) -> float:
     return covered
 
 
-def test_who_cannot_kick_plans_nothing() -> None:
+def test_a_player_that_cannot_kick_plans_nothing() -> None:
     state = situations(300, seed=5)
     made = plans(state)
     me = state.players[torch.arange(300), state.actor]
@@ -133,18 +133,18 @@ def test_the_ball_may_lie_in_the_middle_of_a_player() -> None:
 
 
 def test_a_player_alone_passes_to_itself() -> None:
-    """20 dashes after the kick, if he is far enough up, to where he then is; in his own half only seven."""
+    """20 dashes after the kick far enough up, to where the player then is; in the own half only seven."""
     state = scene(x=21.0)
     assert choice(state) == "self_pass"
     assert rolled(state, "self_pass", 21) == pytest.approx((21.0 + dashed(20), 0.0), abs=1e-3)
-    # The ball starts half a metre ahead of him: it has to be passed.
+    # The ball starts half a metre ahead of the player, which has to pass it.
     back = scene(x=-10.5)
     assert rolled(back, "self_pass", 8) == pytest.approx((-10.5 + dashed(7), 0.0), abs=1e-3)
     assert planned(back)["dribble_value"] < 0 < planned(back)["self_pass_value"]
 
 
-def test_who_is_tired_runs_less() -> None:
-    """2750 are kept; who has nothing left at all runs on what is extra, at half power, but does not dribble."""
+def test_a_tired_player_runs_less() -> None:
+    """2750 are kept; a player with nothing left runs on what is extra, at half power, but does not dribble."""
     state = scene(x=-10.5)
     put(state, 0, stamina=2600.0)
     assert not planned(state)["self_pass_there"]
@@ -155,7 +155,7 @@ def test_who_is_tired_runs_less() -> None:
 
 
 def test_a_dribble_has_the_ball_just_ahead() -> None:
-    """Alone four dashes straight on are value most; where one stands at their end it is two or three."""
+    """Alone four dashes straight on are worth most; with an opponent at their end it is two or three."""
     state = scene()
     put(state, 0, stamina=3300.0)
     ahead = EDGES + 0.2 * MARGIN
@@ -169,9 +169,9 @@ def test_a_dribble_has_the_ball_just_ahead() -> None:
 
 
 def test_a_pass_meets_a_team_mate_before_opponents() -> None:
-    """Where he can be by then; one who stands in its way cuts it off, and another is played."""
+    """Where the team mate can be by then; an opponent in its way cuts it off, and another pass is played."""
     state = scene(x=-12.0)
-    put(state, 1, x=-6.0, y=3.0)  # in his half: no pass far ahead of him
+    put(state, 1, x=-6.0, y=3.0)  # in the own half: no pass far ahead
     put(state, 11, x=40.0, y=0.0, flags=FLAG_GOALIE)
     put(state, 12, x=38.0, y=20.0, body=180.0)
     made = planned(state)
@@ -206,7 +206,7 @@ def test_a_pass_arrives_by_the_ball_decay_of_the_match(decay: float) -> None:
     assert away < dashed(int(made["pass_cycles"]))
 
 
-def test_no_pass_to_who_is_offside_or_not_there() -> None:
+def test_no_pass_to_a_player_that_is_offside_or_tackling() -> None:
     state = scene(x=0.0)
     put(state, 1, x=20.0, y=5.0)
     put(state, 11, x=45.0, y=0.0, flags=FLAG_GOALIE)
@@ -227,7 +227,7 @@ def test_a_free_goal_is_shot_at() -> None:
     assert not planned(far)["shot_there"]
 
 
-def test_who_is_challenged_clears() -> None:
+def test_a_challenged_player_clears() -> None:
     """Towards the goal; from the side of the goal line before it."""
     state = scene(x=-10.0)
     put(state, 11, x=-8.6, y=0.0, body=180.0)
@@ -239,12 +239,12 @@ def test_who_is_challenged_clears() -> None:
     put(side, 11, x=41.4, y=15.0)
     vx, vy = velocity(side, "clear")
     assert vy / vx == pytest.approx(-15.0 / (45.0 - 40.6), abs=1e-3)
-    # Who tackles is no challenge.
+    # An opponent that tackles is no challenge.
     state.players[:, 11, CHANNEL["flags"]] = FLAG_ON_FIELD | FLAG_TACKLING
     assert choice(state) != "clear"
 
 
-def test_who_faces_back_turns_if_nobody_is_near() -> None:
+def test_a_player_that_faces_back_turns_if_nobody_is_near() -> None:
     state = scene(body=180.0, ball=(-0.5, 0.0, 0.0, 0.0))
     assert choice(state) == "turn"
     put(state, 11, x=-3.0, y=1.0)
@@ -260,7 +260,7 @@ def test_a_nearer_team_mate_has_it() -> None:
 
 
 def test_a_ball_that_is_held_stays_in_reach() -> None:
-    """Surrounded, he brings it to where it is least in reach of them."""
+    """A surrounded player brings it to where it is least in reach of the opponents."""
     state = scene(x=-30.0, y=10.0, ball=(0.2, 0.35, 0.0, 0.0))
     for opponent, degrees in enumerate(range(0, 360, 45), 11):
         angle = math.radians(degrees)
@@ -274,7 +274,7 @@ def test_a_ball_that_is_held_stays_in_reach() -> None:
 
 
 def test_what_is_too_much_for_one_kick_is_prepared() -> None:
-    """A hard pass from a ball that lies behind him: the first kick brings it to one of the places beside him."""
+    """A hard pass of a ball behind the player: the first kick brings it to one of the places beside the player."""
     state = scene(x=10.0, ball=(-0.9, 0.2, 0.0, 0.0))
     put(state, 1, x=30.0, y=8.0)
     for opponent, (x, y) in enumerate(((40.0, 0.0), (36.0, 20.0)), 11):
@@ -287,7 +287,7 @@ def test_what_is_too_much_for_one_kick_is_prepared() -> None:
 
 
 def test_kick_order() -> None:
-    """Straight ahead those come first that go from far behind him to far ahead, straight back the others."""
+    """Straight ahead those come first that go from far behind the player to far ahead, straight back the others."""
     order = kick_order(tuple(SERVER_DEFAULTS[[*ORDER_FIELDS]]))
     assert order.shape == (72, 1024, 2)
     assert (order.min(), order.max()) == (0, PLACES - 1)
@@ -335,7 +335,7 @@ def test_a_tackle_before_the_goal_is_a_shot(body: float) -> None:
 
 
 def test_a_tackle_goes_where_no_opponent_is() -> None:
-    """Else towards the nearer side line; with the own goal behind him never into it."""
+    """Else towards the nearer side line; with the own goal behind the player never into it."""
     state = scene(y=10.0, ball=(1.5, 0.0, 0.0, 0.0))
     vx, vy = tackled(state)
     assert vy > 0.9 * abs(vx)
@@ -348,7 +348,7 @@ def test_a_tackle_goes_where_no_opponent_is() -> None:
     assert vx >= 0 or abs(y + vy / vx * (-52.5 - x)) > 8.01
 
 
-def test_who_is_lying_is_late() -> None:
+def test_a_player_that_lies_is_late() -> None:
     state = scene(y=10.0, ball=(1.5, 0.0, 0.0, 0.0))
     for place in range(11, 22):
         put(state, place, x=0.5 * (place - 16), y=24.0, body=-90.0)
@@ -368,7 +368,7 @@ def test_values_show_the_best() -> None:
     made = plans(state)
     able = made[made[:, 0] > 0]
     values = able[:, [PLAN.index(f"{name}_value") for name in VALUED]]
-    # At most one is value more than all others.
+    # At most one is worth more than all others.
     assert ((values > 0).sum(1) <= 1).all()
     assert values.abs().max() <= MOST_VALUE_M
     for way in ("dribble", "self_pass"):

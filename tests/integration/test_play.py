@@ -409,8 +409,8 @@ def test_a_whole_schedule_runs_and_what_is_there_is_kept(tmp_path: Path, server:
 
 def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_path: Path) -> None:
     for more, words in (
-        ("[dataset]\ntest = 2.0\nsplit = 'row'\n", "dataset.split: no 'row'; choose from match, rows"),
-        ("[dataset]\ntest = 2.0\n", "dataset.teams: name the team to clone"),
+        ("[dataset]\ntest = 2.0\nsplit = 'row'\n", "dataset.split: no 'row'; did you mean rows?"),
+        ("[dataset]\ntest = 2.0\n", "dataset.teams: expected a value, got none"),
         ("[train]\npreset = 'small'\n", "[train] needs [dataset]"),
         ("[[dataset]]\nteams = 'Red'\n", "dataset: expected a table"),
         ("[teams.Green]\nname = 'Red'\ncommand = 'r'\n", "teams.Green.name: a team is called"),

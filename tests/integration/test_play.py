@@ -330,7 +330,7 @@ def test_a_full_disk_stops_all_and_nothing_is_lost(tmp_path: Path) -> None:
         schedule = write_schedule(tmp_path, [("Red", "Blue")], matches=2)
         (disk / "ballast").write_bytes(bytes(8_000_000))
         done = teamclone("play", schedule, "--out", out, code=1)
-        assert "make room and give the same command again" in done.stderr
+        assert "make room and give the command again" in done.stderr
         (disk / "ballast").unlink()
         answer = play(schedule, out)
         assert (answer["complete"], answer["played"]) == (2, 1)

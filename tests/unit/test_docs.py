@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import re
 import shlex
-from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,7 @@ import typer.main
 
 import teamclone
 from teamclone.cli.app import app
-from teamclone.models.config import FAMILIES
-from teamclone.training.config import Config, to_table
+from teamclone.training.config import setting_names
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -113,8 +111,7 @@ def test_commands_in_the_pages_have_these_options() -> None:
 
 def test_settings_in_the_pages_are_settings() -> None:
     """Of `--set`, and wherever a page names one."""
-    known = {f"{section}.{key}" for section, values in to_table(Config()).items() for key in values}
-    known |= {f"model.{item.name}" for family in FAMILIES.values() for item in fields(family)}
+    known = setting_names()
     for page, (name, *words) in typed():
         if name in ("train", "adapt", "search"):
             given = [after.partition("=")[0] for word, after in pairwise(words) if word == "--set"]

@@ -22,6 +22,8 @@ ATTENTION_HEADS = 4
 """Heads of attention in `layers.players.PlayerEncoder`."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
 """Hidden activations."""
+PARAMETER_LOSSES = ("paper", "masked")
+"""Errors of the parameters that a point head learns by, see `loss.point_loss`."""
 LOSS_SETTINGS = ("parameter_loss", "parameter_weight", "target_weight", "extra_kicks")
 """Settings of the families that only training uses; all others make the network what it is."""
 
@@ -67,7 +69,7 @@ class PaperConfig(ModelConfig):
 
     own_type: bool = setting(False)
     all_types: tuple[str, ...] = setting((), choices=tuple(GROUPS))
-    parameter_loss: str = setting("paper", choices=("paper", "masked"))
+    parameter_loss: str = setting("paper", choices=PARAMETER_LOSSES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +100,7 @@ class EgocentricPointConfig(EgocentricTrunkConfig):
 
     family: ClassVar[str] = "egocentric-point"
 
-    parameter_loss: str = setting("masked", choices=("paper", "masked"))
+    parameter_loss: str = setting("masked", choices=PARAMETER_LOSSES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,6 +47,13 @@ class Path(NamedTuple):
 
 
 @kernel
+def path_along(speed: float, degrees: float) -> Path:
+    """Return the path of a ball that leaves its place in a direction on the pitch."""
+    angle = math.radians(degrees)
+    return Path(speed, math.cos(angle), math.sin(angle))
+
+
+@kernel
 def ball_after(scene: Array, path: Path, cycle: int) -> tuple[float, float]:
     """Return where the ball is after at most CYCLES on a path."""
     metres = path.speed * scene[BALL, ROLL + cycle]

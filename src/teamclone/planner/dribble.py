@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teamclone.planner.ball import most_acceleration, speed_over
+from teamclone.planner.candidates import VALUE, by_value, nothing
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.motion import dash_metres
 from teamclone.planner.players import DRIBBLE, HARDLY_M, arrival
@@ -51,17 +51,9 @@ SEEN_M = 20.0
 OFF_M = 0.1
 """By how much a ball has to pass the player at least."""
 INSIDE_M = 1.0
-VALUE, SPEED, DIRECTION, TO_X, TO_Y, ARRIVES, COLUMNS = range(7)
-"""Columns of a way to kick the ball and run after it, and how many: its value, the speed of the ball and its direction,
+SPEED, DIRECTION, TO_X, TO_Y, ARRIVES, COLUMNS = range(1, 7)
+"""Columns of a way to kick the ball and run after it, and how many with VALUE: the speed of the ball and its direction,
 where it is met and after how many cycles."""
-
-
-@kernel
-def nothing() -> Array:
-    """Return (COLUMNS,) what is found where there is nothing."""
-    none = np.zeros(COLUMNS)
-    none[VALUE] = -np.inf
-    return none
 
 
 @kernel
@@ -87,15 +79,9 @@ def meet(scene: Array, x: float, y: float, cycles: int, made: Array) -> bool:
 
 
 @kernel
-def by_value(made: Array) -> NDArray[np.int64]:
-    """Return (len(made),) the rows from the greatest value on; of equal ones the first comes first."""
-    return np.argsort(-made[:, VALUE], kind="mergesort")
-
-
-@kernel
-def _hindered(scene: Array, place: tuple[float, float], cycles: int) -> bool:
-    """Return whether an opponent has the ball at the end of a dribble."""
-    ball = scene[BALL]
+def _free(scene: Array, one: Array) -> bool:
+    """Return whether no opponent has the ball at the end of a dribble."""
+    ball, place, cycles = scene[BALL], (one[TO_X], one[TO_Y]), int(one[ARRIVES])
     metres = gap(place[0], place[1], ball[X], ball[Y])
     cos, sin = (place[0] - ball[X]) / metres, (place[1] - ball[Y]) / metres
     for opponent in range(OPPONENT, BALL):
@@ -103,8 +89,8 @@ def _hindered(scene: Array, place: tuple[float, float], cycles: int) -> bool:
         ahead, _ = along(player[X] - ball[X], player[Y] - ball[Y], cos, sin)
         seen = player[AWAY] <= SEEN_M and ahead >= DRIBBLE.behind_m
         if seen and arrival(scene, player, place, cycles, DRIBBLE) <= cycles:
-            return True
-    return False
+            return False
+    return True
 
 
 @kernel
@@ -147,6 +133,6 @@ def best_dribble(scene: Array) -> Array:
     """Return (COLUMNS,) the free dribble of the greatest value; VALUE is minus infinity where there is none."""
     made = _dribbles(scene)
     for index in by_value(made):
-        if not _hindered(scene, (made[index, TO_X], made[index, TO_Y]), int(made[index, ARRIVES])):
+        if _free(scene, made[index]):
             return made[index]
-    return nothing()
+    return nothing(COLUMNS)

@@ -20,18 +20,14 @@ from teamclone.planner.scene import (
     SERVER,
     STAMINA,
     STAMINA_INC,
-    VX,
-    VY,
     Array,
-    X,
-    Y,
     inertia_point,
     kernel,
 )
 from teamclone.rcss.server_params import SERVER_FIELD
 
-S_X, S_Y, S_VX, S_VY, S_STAMINA, S_EFFORT, S_RECOVERY, S_CAPACITY = range(8)
-"""Columns of a player's motion, a part of the columns of a player."""
+S_STAMINA, S_EFFORT, S_RECOVERY, S_CAPACITY = range(4)
+"""What dashes use up, a part of the columns of a player."""
 (_MOST, _TOTAL, _RECOVER_THR, _RECOVER_DEC, _RECOVER_MIN, _EFFORT_DEC_THR, _EFFORT_DEC, _EFFORT_INC_THR, _EFFORT_INC,
  _ACCEL_MAX, _SIDE_RATE, _BACK_RATE) = (SERVER_FIELD[name] for name in (
     "stamina_max", "stamina_capacity", "recover_dec_thr", "recover_dec", "recover_min", "effort_dec_thr", "effort_dec",
@@ -39,62 +35,38 @@ S_X, S_Y, S_VX, S_VY, S_STAMINA, S_EFFORT, S_RECOVERY, S_CAPACITY = range(8)
 
 
 @kernel
-def motion_of(me: Array) -> Array:
-    """Return (8,) a player's motion now."""
-    return np.array([me[X], me[Y], me[VX], me[VY], me[STAMINA], me[EFFORT], me[RECOVERY], me[CAPACITY]])
+def stamina_of(me: Array) -> Array:
+    """Return (4,) a player's stamina, effort, recovery and capacity now."""
+    return np.array([me[STAMINA], me[EFFORT], me[RECOVERY], me[CAPACITY]])
 
 
 @kernel
-def recover(server: Array, me: Array, motion: Array) -> None:
+def recover(server: Array, me: Array, left: Array) -> None:
     """Change stamina, effort, recovery and capacity as the end of a cycle does; `dynamics.formulas.rested`."""
-    stamina, most = motion[S_STAMINA], server[_MOST]
+    stamina, most = left[S_STAMINA], server[_MOST]
     if stamina <= server[_RECOVER_THR] * most:
-        motion[S_RECOVERY] = max(motion[S_RECOVERY] - server[_RECOVER_DEC], server[_RECOVER_MIN])
+        left[S_RECOVERY] = max(left[S_RECOVERY] - server[_RECOVER_DEC], server[_RECOVER_MIN])
     if stamina <= server[_EFFORT_DEC_THR] * most:
-        motion[S_EFFORT] = max(motion[S_EFFORT] - server[_EFFORT_DEC], me[EFFORT_MIN])
+        left[S_EFFORT] = max(left[S_EFFORT] - server[_EFFORT_DEC], me[EFFORT_MIN])
     if stamina >= server[_EFFORT_INC_THR] * most:
-        motion[S_EFFORT] = min(motion[S_EFFORT] + server[_EFFORT_INC], me[EFFORT_MAX])
-    recovered = min(me[STAMINA_INC] * motion[S_RECOVERY], most - stamina)
+        left[S_EFFORT] = min(left[S_EFFORT] + server[_EFFORT_INC], me[EFFORT_MAX])
+    recovered = min(me[STAMINA_INC] * left[S_RECOVERY], most - stamina)
     if server[_TOTAL] >= 0:
-        recovered = min(recovered, motion[S_CAPACITY])
-    motion[S_STAMINA] += recovered
-    motion[S_CAPACITY] = max(0.0, motion[S_CAPACITY] - recovered)
+        recovered = min(recovered, left[S_CAPACITY])
+    left[S_STAMINA] += recovered
+    left[S_CAPACITY] = max(0.0, left[S_CAPACITY] - recovered)
 
 
 @kernel
-def drift(server: Array, me: Array, motion: Array) -> None:
-    """Pass a cycle without a dash."""
-    motion[S_X] += motion[S_VX]
-    motion[S_Y] += motion[S_VY]
-    motion[S_VX] *= me[DECAY]
-    motion[S_VY] *= me[DECAY]
-    recover(server, me, motion)
-
-
-@kernel
-def dash(server: Array, me: Array, motion: Array, power: float, heading: tuple[float, float]) -> None:
-    """Pass a cycle with a dash straight ahead.
-
-    Args:
-        heading: cosine and sine of the body.
-    """
-    added = min(power * me[DASH_RATE] * motion[S_EFFORT], server[_ACCEL_MAX])
-    motion[S_VX] += added * heading[0]
-    motion[S_VY] += added * heading[1]
-    motion[S_STAMINA] = max(0.0, motion[S_STAMINA] - power)
-    drift(server, me, motion)
-
-
-@kernel
-def spare(server: Array, me: Array, motion: Array, reserve: float, last: bool) -> float:
+def spare(server: Array, me: Array, left: Array, reserve: float, last: bool) -> float:
     """Return the power of a dash that leaves ``reserve`` beyond what lets recovery fall.
 
     Args:
         last: whether a player without capacity, who has nothing to save for, spends all.
     """
-    spends_all = last and motion[S_CAPACITY] <= 0
+    spends_all = last and left[S_CAPACITY] <= 0
     kept = -me[EXTRA] if spends_all else server[_RECOVER_THR] * server[_MOST] + reserve
-    return min(max(0.0, motion[S_STAMINA] - kept), server[MAX_DASH])
+    return min(max(0.0, left[S_STAMINA] - kept), server[MAX_DASH])
 
 
 @kernel
@@ -130,15 +102,17 @@ def dash_metres(scene: Array, waits: int, reserve: float, last: bool, metres: Ar
         How many dashes there are until the first one without power.
     """
     server, me = scene[SERVER], scene[ACTOR]
-    motion = motion_of(me)
-    motion[:S_STAMINA] = 0.0
+    left, covered, speed, strong = stamina_of(me), 0.0, 0.0, len(metres)
     for _ in range(waits):
-        recover(server, me, motion)
-    strong = len(metres)
+        recover(server, me, left)
     for count in range(len(metres)):
-        power = spare(server, me, motion, reserve, last)
+        power = spare(server, me, left, reserve, last)
         if power <= 0:
             strong = min(strong, count)
-        dash(server, me, motion, power, (1.0, 0.0))
-        metres[count] = motion[S_X]
+        speed += min(power * me[DASH_RATE] * left[S_EFFORT], server[_ACCEL_MAX])
+        covered += speed
+        metres[count] = covered
+        speed *= me[DECAY]
+        left[S_STAMINA] = max(0.0, left[S_STAMINA] - power)
+        recover(server, me, left)
     return strong

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from teamclone.planner.ball import NEVER_CYCLES, Path, cycles_over, fastest_from, speed_over
-from teamclone.planner.dribble import by_value
+from teamclone.planner.ball import NEVER_CYCLES, cycles_over, fastest_from, path_along, speed_over
+from teamclone.planner.candidates import VALUE, by_value, nothing
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.players import (
     BOLD_PASS,
@@ -90,8 +90,8 @@ FAR_X, LONG_CYCLES = 30.0, 15
 """A receiver that faces a place beyond this x, so many cycles away, may meet the ball together with an opponent."""
 BOLD_SPEED, LONG_X = 2.0, 25.0
 """Speed forward of a pass behind the opponents' line; the x from which on a pass is a LONG_PASS."""
-VALUE, TO_X, TO_Y, ARRIVES, SPEED, DIRECTION, KICKS, KIND, RECEIVER, COLUMNS = range(10)
-"""Columns of a pass, and how many."""
+TO_X, TO_Y, ARRIVES, SPEED, DIRECTION, KICKS, KIND, RECEIVER, COLUMNS = range(1, 10)
+"""Columns of a pass, after VALUE, and how many."""
 
 Mask = NDArray[np.bool_]
 
@@ -286,8 +286,8 @@ def _allowance(scene: Array, one: Array) -> Allowance:
 @kernel
 def _safe(scene: Array, one: Array) -> bool:
     """Return whether the receiver has the ball before any opponent."""
-    angle, allowance, last = math.radians(one[DIRECTION]), _allowance(scene, one), int(one[ARRIVES])
-    path, field_last = Path(one[SPEED], math.cos(angle), math.sin(angle)), last
+    path, allowance, last = path_along(one[SPEED], one[DIRECTION]), _allowance(scene, one), int(one[ARRIVES])
+    field_last = last
     if one[KIND] == THROUGH:
         receiver = scene[int(one[RECEIVER])]
         off = turned(receiver[BODY] - direction(one[TO_X] - receiver[X], one[TO_Y] - receiver[Y]))
@@ -302,12 +302,16 @@ def _safe(scene: Array, one: Array) -> bool:
 
 
 @kernel
+def _free(scene: Array, one: Array) -> bool:
+    """Fill the columns of `_timed`, and return whether the pass can be played and no opponent has it first."""
+    return _timed(scene, one) and _safe(scene, one)
+
+
+@kernel
 def best_pass(scene: Array) -> Array:
     """Return (COLUMNS,) the safe pass of the greatest value; its KICKS are 0 where there is none."""
     made = _passes(scene)
     for index in by_value(made):
-        if _timed(scene, made[index]) and _safe(scene, made[index]):
+        if _free(scene, made[index]):
             return made[index]
-    none = np.zeros(COLUMNS)
-    none[VALUE] = -np.inf
-    return none
+    return nothing(COLUMNS)

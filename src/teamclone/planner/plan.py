@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from teamclone.planner import dribble, passes
 from teamclone.planner.ball import fastest_from, kick_rate
+from teamclone.planner.candidates import VALUE
 from teamclone.planner.dribble import best_dribble
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.hold_ball import hold_ball, stays
@@ -207,7 +208,7 @@ def _plan_with_ball(scene: Array, actor: int, order: NDArray[np.int64], made: Ar
         there[_PASS] = plays
         made[_KICKS], made[_KICKS + 1] = passed[passes.KICKS], passed[passes.ARRIVES]
     for way, found in ((_DRIBBLE, dribbled), (_SELF_PASS, ran)):
-        if found[dribble.VALUE] > -np.inf:
+        if found[VALUE] > -np.inf:
             angle = math.radians(found[dribble.DIRECTION])
             there[way] = 1.0
             velocity[2 * way] = found[dribble.SPEED] * math.cos(angle)
@@ -217,7 +218,7 @@ def _plan_with_ball(scene: Array, actor: int, order: NDArray[np.int64], made: Ar
     there[_HOLD] = not turns
 
     held = evaluate(scene, ball[X], ball[Y], True)
-    values = np.array([passed[passes.VALUE], dribbled[dribble.VALUE], ran[dribble.VALUE], held])
+    values = np.array([passed[VALUE], dribbled[VALUE], ran[VALUE], held])
     best = _compare(values, made[_VALUE:])
     backward = abs(turned(direction(FORWARD_X - me[X], -me[Y]) - me[BODY])) >= FORWARD_DEG
     if left:
@@ -284,6 +285,12 @@ _plan_all = _compiled()
 _order = lru_cache(maxsize=64)(kick_order)
 
 
+@lru_cache(maxsize=16)
+def _orders(servers: tuple[tuple[float, ...], ...]) -> NDArray[np.int64]:
+    """Return (len(servers), ...) the `kick_order` of each of these values of ORDER_FIELDS."""
+    return np.stack([_order(server) for server in servers])
+
+
 tell_when_compiled({_plan_all: "compiling the plans with the ball, once (half a minute)"})
 
 
@@ -298,6 +305,6 @@ def plan(ball: Array, players: Array, types: Array, server: Array, actor: NDArra
     made = np.zeros((len(actor), len(PLAN)))
     if len(actor):
         servers, which = np.unique(server[:, ORDER_FIELDS].astype(np.float64), axis=0, return_inverse=True)
-        orders = np.stack([_order(tuple(row)) for row in servers.tolist()])
+        orders = _orders(tuple(map(tuple, servers.tolist())))
         _plan_all(scenes(ball, players, types, server), actor, orders, which.reshape(-1), made)
     return made

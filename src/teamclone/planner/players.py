@@ -178,14 +178,6 @@ def intercept(scene: Array, player: Array, path: Path, cycles: tuple[int, int], 
     return NEVER_CYCLES
 
 
-@kernel
-def seen_from(player: Array, place: tuple[float, float], cycle: int) -> tuple[float, float]:
-    """Return how far a place is ahead of a player, and aside, from where it drifts to in so many cycles."""
-    from_x, from_y = inertia_point(player, cycle)
-    body = math.radians(player[BODY])
-    return along(place[0] - from_x, place[1] - from_y, math.cos(body), math.sin(body))
-
-
 class Pose(NamedTuple):
     """Where a player stands, metres on the pitch, and the cosine and sine of its body."""
 

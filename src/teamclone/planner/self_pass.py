@@ -7,16 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.planner.ball import Path, ball_after
-from teamclone.planner.dribble import ARRIVES, COLUMNS, DIRECTION, SPEED, TO_X, TO_Y, by_value, meet, nothing
+from teamclone.planner.ball import ball_after, path_along
+from teamclone.planner.candidates import by_value, nothing
+from teamclone.planner.dribble import ARRIVES, COLUMNS, DIRECTION, SPEED, TO_X, TO_Y, meet
 from teamclone.planner.motion import dash_metres
-from teamclone.planner.players import (
-    SELF_PASS,
-    SELF_PASS_AHEAD,
-    arrival,
-    reach_of,
-    seen_from,
-)
+from teamclone.planner.players import SELF_PASS, SELF_PASS_AHEAD, arrival, bearing, pose_after
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
@@ -56,20 +51,20 @@ AT_ONCE_M = 0.1
 
 
 @kernel
-def _overtaken(scene: Array, place: tuple[float, float], path: Path, cycles: int) -> bool:
-    """Return whether an opponent has the ball in the next cycle or at its end."""
-    ball = scene[BALL]
-    next_ball = ball_after(scene, path, 1)
+def _free(scene: Array, one: Array) -> bool:
+    """Return whether no opponent has the ball in the next cycle or at its end."""
+    ball, place, cycles = scene[BALL], (one[TO_X], one[TO_Y]), int(one[ARRIVES])
+    path = path_along(one[SPEED], one[DIRECTION])
+    next_x, next_y = ball_after(scene, path, 1)
     for player in scene[OPPONENT:BALL]:
-        ahead, aside = seen_from(player, next_ball, 1)
-        drifted, dashed = math.hypot(ahead, aside) - AT_ONCE_M, math.hypot(ahead - player[DASH_ACCEL], aside)
-        if min(drifted, dashed) < reach_of(player, next_ball[0], next_ball[1]):
-            return True
+        lies = bearing(player, pose_after(player, 1), next_x, next_y)
+        if min(lies.metres - AT_ONCE_M, math.hypot(lies.ahead - player[DASH_ACCEL], lies.aside)) < lies.reach:
+            return False
         before, _ = along(player[X] - ball[X], player[Y] - ball[Y], path.cos, path.sin)
         allowance = SELF_PASS_AHEAD if before > IN_THE_WAY_M else SELF_PASS
         if before >= allowance.behind_m and arrival(scene, player, place, cycles, allowance) <= cycles:
-            return True
-    return False
+            return False
+    return True
 
 
 @kernel
@@ -114,9 +109,6 @@ def best_self_pass(scene: Array) -> Array:
     """Return (COLUMNS,) the safe self pass of the greatest value; VALUE is minus infinity where there is none."""
     made = _self_passes(scene)
     for index in by_value(made):
-        one = made[index]
-        angle = math.radians(one[DIRECTION])
-        path = Path(one[SPEED], math.cos(angle), math.sin(angle))
-        if not _overtaken(scene, (one[TO_X], one[TO_Y]), path, int(one[ARRIVES])):
-            return one
-    return nothing()
+        if _free(scene, made[index]):
+            return made[index]
+    return nothing(COLUMNS)

@@ -109,6 +109,12 @@ class Config:
     train: TrainConfig = field(default_factory=TrainConfig)
 
 
+def setting_names() -> set[str]:
+    """Return the names of all settings, ``section.key``, of every model family."""
+    models = {f"model.{item.name}" for family in FAMILIES.values() for item in fields(family)}
+    return {"model.family", *models, *(name for name, _ in _flat(to_table(Config())))}
+
+
 def preset_names() -> list[str]:
     """Return the names of the presets that come with the package."""
     folder = resources.files("teamclone.training") / "presets"

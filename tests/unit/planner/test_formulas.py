@@ -137,10 +137,10 @@ def dashes(random: Random) -> tuple[float, float]:
 def rested(random: Random) -> tuple[object, object]:
     server, of_type, row, me = drawn(random)
     state = [random.uniform(0, 8000), random.uniform(0.6, 1), random.uniform(0.5, 1), random.choice([0.0, 20.0, 9e4])]
-    moved = np.array([0.0, 0.0, 0.0, 0.0, *state])
-    motion.recover(row, me, moved)
+    left = np.array(state)
+    motion.recover(row, me, left)
     names = ("stamina_inc_max", "effort_min", "effort_max")
-    return moved[4:], [
+    return left, [
         float(part) for part in formulas.rested(*state, server=server, **{name: of_type[name] for name in names})
     ]
 

@@ -76,7 +76,9 @@ def assignment(text: str, *, option: str = "--set") -> tuple[str, Any]:
     return key.strip(), value_of(value.strip())
 
 
-def from_table(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any:
+def from_table(
+    cls: type[Any], table: Any, key: str, problems: list[str], *, renamed: Mapping[str, str] | None = None
+) -> Any:
     """Make a dataclass of a TOML table.
 
     A value that does not fit is left out, so its field has the default. A class may have a method ``problems(key)``
@@ -88,12 +90,18 @@ def from_table(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any
         table: the table as `tomllib` read it.
         key: what messages call the table: ``train`` of ``train.epochs``.
         problems: mistakes are appended to it.
+        renamed: present names of settings by former ones, each ``section.name``; None for none.
     """
     if not isinstance(table, dict):
         problems.append(f"{key}: expected a table, got {table!r}")
         table = {}
+    now = renamed or {}
     before, hints, names = len(problems), get_type_hints(cls), [item.name for item in fields(cls)]
-    problems += [f"no setting {key}.{name}; {choose(name, names)}" for name in table if name not in names]
+    problems += [
+        f"no setting {where}; {renaming(where, now) or choose(name, names)}"
+        for name, where in ((name, f"{key}.{name}") for name in table)
+        if name not in names
+    ]
     kept: dict[str, Any] = {}
     for item in fields(cls):
         where = f"{key}.{item.name}"
@@ -110,6 +118,11 @@ def from_table(cls: type[Any], table: Any, key: str, problems: list[str]) -> Any
     if len(problems) == before and hasattr(made, "problems"):
         problems += made.problems(key)
     return made
+
+
+def renaming(key: str, renamed: Mapping[str, str]) -> str:
+    """Return the remedy for a former name of a setting, empty for a name that never was one."""
+    return f"{key} is now {renamed[key]}" if key in renamed else ""
 
 
 def without_effect(settings: Any, key: str, names: Iterable[str], beside: str) -> list[str]:

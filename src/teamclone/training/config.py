@@ -12,12 +12,25 @@ from typing import Any
 from teamclone.errors import UsageError, choose
 from teamclone.models.config import FAMILIES, ModelConfig, PaperConfig
 from teamclone.system import settings
-from teamclone.system.settings import assignment, from_table, setting, table_of, without_effect
+from teamclone.system.settings import assignment, from_table, renaming, setting, table_of, without_effect
 
 WITH_ADAM = ("adam", "muon")
 """Optimisers that have Adam's settings."""
 MAY_CHANGE = ("train.epochs", "train.max_minutes")
 """Settings that may differ in a resumed run: they do not change what an epoch does."""
+RENAMED = {
+    "model.features": "model.family",
+    "model.head": "model.family",
+    "model.aims": "model.target_points",
+    "model.aim_hidden": "model.target_hidden",
+    "model.members": "model.ensemble_size",
+    "train.aim_weight": "model.target_weight",
+    "train.kicks": "model.extra_kicks",
+    "train.parameter_loss": "model.parameter_loss",
+    "train.parameter_weight": "model.parameter_weight",
+    "data.keep_gb": "data.cache_gb",
+}
+"""Present names of settings by former ones."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,8 +210,8 @@ def config_from(table: dict[str, Any], *, where: str, problems: Iterable[str] = 
     found += [f"no section {name!r}; there are {', '.join(sections)}" for name in table if name not in sections]
     config = Config(
         model=_model(table.get("model", {}), found),
-        data=from_table(DataConfig, table.get("data", {}), "data", found),
-        train=from_table(TrainConfig, table.get("train", {}), "train", found),
+        data=from_table(DataConfig, table.get("data", {}), "data", found, renamed=RENAMED),
+        train=from_table(TrainConfig, table.get("train", {}), "train", found, renamed=RENAMED),
     )
     if found:
         raise UsageError(f"{where}: {'; '.join(found)}")
@@ -213,7 +226,7 @@ def _model(table: Any, problems: list[str]) -> ModelConfig:
     if family not in FAMILIES:
         problems.append(f"model.family: no {family!r}; {choose(family, list(FAMILIES))}")
         return PaperConfig()
-    model: ModelConfig = from_table(FAMILIES[family], rest, "model", problems)
+    model: ModelConfig = from_table(FAMILIES[family], rest, "model", problems, renamed=RENAMED)
     return model
 
 
@@ -244,6 +257,8 @@ def _flat(table: Mapping[str, Mapping[str, Any]]) -> Iterable[tuple[str, Any]]:
 
 def _unknown(key: str, table: Mapping[str, Mapping[str, Any]]) -> str:
     """Return what to say of a key that no section has; `choose` would not find `train.epochs` for `epochs`."""
+    if now := renaming(key, RENAMED):
+        return f"no setting {key!r}; {now}"
     known = [name for name, _ in _flat(table)]
     same = [name for name in known if name.partition(".")[2] == key.rpartition(".")[2]]
     remedy = f"did you mean {' or '.join(same)}?" if same else choose(key, known)

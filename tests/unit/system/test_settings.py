@@ -113,6 +113,17 @@ def test_what_does_not_fit_is_named_and_left_out(table: dict[str, Any], problem:
         assert made == Settings(name="x")
 
 
+def test_a_former_name_is_answered_with_the_present_one() -> None:
+    problems: list[str] = []
+    former = {"it.number": "other.count", "other.nmae": "it.name"}
+    made = from_table(Settings, {"name": "x", "number": 2, "nmae": 1}, "it", problems, renamed=former)
+    assert problems == [
+        "no setting it.number; it.number is now other.count",
+        "no setting it.nmae; did you mean name?",
+    ]
+    assert made == Settings(name="x")
+
+
 def test_all_mistakes_are_reported_together() -> None:
     made, problems = read({"count": 0, "share": 2, "other": 1})
     assert len(problems) == 4

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import re
 import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 from teamclone.errors import UsageError
 from teamclone.models.config import EgocentricConfig, EgocentricPointConfig, PaperConfig
 from teamclone.training.config import (
+    RENAMED,
     Config,
     config_from,
     differences,
@@ -16,6 +19,7 @@ from teamclone.training.config import (
     override,
     preset_names,
     preset_text,
+    setting_names,
     to_table,
     to_toml,
 )
@@ -129,6 +133,32 @@ def test_mistakes_are_named(text: str, answer: str) -> None:
         load_config("small", [text])
     assert answer in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("former", RENAMED)
+def test_a_former_name_is_answered_with_the_present_one(former: str) -> None:
+    present, (section, _, name) = RENAMED[former], former.partition(".")
+    assert former not in setting_names()
+    assert present in setting_names()
+    with pytest.raises(UsageError) as error:
+        load_config("best", [f"{former}=1"])
+    assert str(error.value) == f"--set: no setting {former!r}; {former} is now {present}"
+    with pytest.raises(UsageError) as error:
+        config_from({section: {name: 1}}, where="config.toml")
+    assert str(error.value) == f"config.toml: no setting {former}; {former} is now {present}"
+
+
+def test_former_names_are_those_of_the_changelog() -> None:
+    text = (Path(__file__).parents[3] / "CHANGELOG.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:3] for line in text.splitlines() if line.startswith("  | `")]
+    listed = {old: new for before, now in rows for old, new in _pairs(before, now)}
+    assert listed == RENAMED
+
+
+def _pairs(before: str, now: str) -> list[tuple[str, str]]:
+    """Former and present names of a row; several former ones may have become one."""
+    old, new = (re.findall(r"`([a-z]+\.[a-z_]+)", cell) for cell in (before, now))
+    return list(zip(old, new * len(old) if len(new) == 1 else new, strict=True))
 
 
 def test_all_mistakes_are_told_at_once() -> None:

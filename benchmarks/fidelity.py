@@ -47,7 +47,7 @@ from teamclone.evaluation.evaluate import count_training
 from teamclone.evaluation.predict import predict, truth
 from teamclone.evaluation.predictions import Predictions
 from teamclone.models.clone import parameter_count
-from teamclone.models.config import BLOCKS, FAMILIES
+from teamclone.models.config import BLOCKS, FAMILIES, of_targets
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.planned import plans
 from teamclone.models.inputs.reach import kickable_area, reach_ball
@@ -154,12 +154,13 @@ def without(blocks: Sequence[str], *names: str) -> str:
     return ",".join(block for block in blocks if block not in names)
 
 
-def of_family(overrides: tuple[str, ...]) -> tuple[str, ...]:
-    """The overrides that the model family among them has; all where they name none."""
+def with_effect(overrides: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the overrides of `best` without those that another family or no target points leave without effect."""
     values = dict(assignment(text) for text in overrides)
-    if "model.family" not in values:
-        return overrides
-    known = {"family", *(item.name for item in fields(FAMILIES[values["model.family"]]))}
+    family = FAMILIES[values.get("model.family", "egocentric")]
+    known = {"family", *(item.name for item in fields(family))}
+    if values.get("model.target_points") == 0:
+        known -= {*of_targets(family)}
     return tuple(text for text in overrides if not text.startswith("model.") or text[6:].partition("=")[0] in known)
 
 
@@ -222,7 +223,7 @@ def experiments(*, n_train: int, scale: float, short_epochs: int, quick: bool) -
     made.append(Experiment(name="plain", step="def", preset="best", overrides=(*short, *PLAIN)))
     for step, beside, variants in (("k", (), KICKS), ("d", PLAIN, ablations()), ("e", PLAIN, REMEDIES)):
         made += [
-            Experiment(name=name, step=step, preset="best", overrides=of_family((*short, *beside, *changes)))
+            Experiment(name=name, step=step, preset="best", overrides=with_effect((*short, *beside, *changes)))
             for name, changes in variants.items()
         ]
     return made

@@ -6,12 +6,12 @@ the preset that it is for: `paper` of `PaperConfig`, `best` of `EgocentricConfig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from teamclone.rcss.commands import CLONED, REPERTOIRE, not_of_repertoire
 from teamclone.rcss.player_types import GROUPS
-from teamclone.system.settings import setting
+from teamclone.system.settings import setting, without_effect
 
 BLOCKS = (
     "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
@@ -89,6 +89,12 @@ class EgocentricTrunkConfig(ModelConfig):
     target_points: int = setting(6, at_least=0)
     target_hidden: tuple[int, ...] = setting((512, 256), at_least=1)
 
+    def problems(self, key: str) -> list[str]:
+        """Return settings that would have no effect; see `system.settings.from_table`."""
+        if self.target_points:
+            return []
+        return without_effect(self, key, of_targets(type(self)), f"{key}.target_points = 0")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EgocentricPointConfig(EgocentricTrunkConfig):
@@ -127,6 +133,11 @@ class EgocentricConfig(EgocentricTrunkConfig):
     kick_attention: int = setting(64, at_least=0, rule=_attention)
     target_weight: float = setting(0.1, at_least=0)
     extra_kicks: int = setting(64, at_least=0)
+
+
+def of_targets(family: type[ModelConfig]) -> tuple[str, ...]:
+    """Return the settings of a family that have no effect without target points."""
+    return tuple(item.name for item in fields(family) if item.name in ("target_hidden", "target_weight"))
 
 
 FAMILIES: dict[str, type[ModelConfig]] = {

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from teamclone.errors import UsageError
-from teamclone.models.config import ACTIVATIONS, EgocentricTrunkConfig
+from teamclone.models.config import ACTIVATIONS, EgocentricTrunkConfig, ModelConfig, of_targets
 from teamclone.search.trials import (
     SETTLED,
     Mode,
@@ -19,6 +19,7 @@ from teamclone.search.trials import (
     Trial,
     rank,
 )
+from teamclone.system.settings import table_of
 from teamclone.training.config import WITH_ADAM, TrainConfig
 
 OPTIMISERS = ("adam", "rmsprop", "adagrad")
@@ -153,6 +154,8 @@ class Study:
             factor = base.data.batch_size / chosen["data.batch_size"]
             for name in ("batches_per_epoch", "validation_batches"):
                 settings[f"data.{name}"] = int(getattr(base.data, name) * factor)
+        if chosen.get("model.target_points") == 0:
+            settings |= {f"model.{name}": value for name, value in _without_targets(base.model).items()}
         return [Trial(name=f"{len(trials):04d}", settings=settings)]
 
     def prunes(self, trial: Trial, trials: Sequence[Trial]) -> bool:
@@ -211,6 +214,12 @@ class Study:
             distributions=space,
             intermediate_values=dict(enumerate(trial.curve, 1)),
         )
+
+
+def _without_targets(model: ModelConfig) -> dict[str, Any]:
+    """Return the defaults of the settings that have no effect without target points, where ``model`` has others."""
+    now, usual = table_of(model), table_of(type(model)())
+    return {name: usual[name] for name in of_targets(type(model)) if now[name] != usual[name]}
 
 
 @dataclass(frozen=True)

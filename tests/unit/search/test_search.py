@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 
 from teamclone.errors import RunError, UsageError
 from teamclone.models.clone import Clone, parameter_count
-from teamclone.models.config import ACTIVATIONS
+from teamclone.models.config import ACTIVATIONS, EgocentricConfig
 from teamclone.search.strategies import Beam, Optimisers, Strategy, Study
 from teamclone.search.trials import (
     Mode,
@@ -166,16 +167,21 @@ def test_a_study_proposes_settings_that_can_be_trained() -> None:
         assert ("model.parameter_weight" in seen) == ("model.target_points" in seen) == (preset == "best")
 
 
-def test_a_study_may_leave_the_target_points_out() -> None:
-    plan = study("best", trials=40)
-    held = tuple(plan.space().keys() - {"model.target_points"})
-    plan = study("best", trials=40, held=held)
+@pytest.mark.parametrize("overrides", [(), ("model.target_hidden=[8]", "model.target_weight=0.2")])
+def test_a_study_may_leave_the_target_points_out(overrides: tuple[str, ...]) -> None:
+    """With them go the settings that only they use."""
+    held = tuple(study("best").space().keys() - {"model.target_points"})
+    plan = study("best", overrides, trials=40, held=held)
     trials: list[Trial] = []
     while found := plan.propose(trials):
         trials.append(finish(found[0], 0.5))
     configs = [config_of(trial, plan.config.base) for trial in trials]
     assert {config.model.target_points for config in configs} == {0, 2, 4, 6, 8, 10, 12}
     assert all(parameter_count(Clone(config.model)) for config in configs)
+    base = plan.config.base.model
+    for model in (config.model for config in configs):
+        points = model.target_points
+        assert model == (replace(base, target_points=points) if points else EgocentricConfig(target_points=0))
 
 
 def test_a_study_is_the_same_whenever_it_is_gone_on_with() -> None:

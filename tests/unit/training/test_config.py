@@ -210,12 +210,28 @@ def test_mistakes_of_the_egocentric_family_are_named(text: str, answer: str) -> 
             "weight_decay has no effect with train.opt",
         ),
         ("paper", ["train.balance_strength=0.5"], "train.balance_strength has no effect with train.balance = none"),
+        (
+            "best",
+            ["model.target_points=0", "model.target_weight=0.2"],
+            "--set: model.target_weight has no effect with model.target_points = 0; leave it out, or set it to 0.1",
+        ),
+        (
+            "best",
+            ["model.family=egocentric-point", "model.target_points=0", "model.target_hidden=8"],
+            "model.target_hidden has no effect with model.target_points = 0; leave it out, or set it to [512, 256]",
+        ),
     ],
 )
 def test_settings_that_would_have_no_effect_are_refused(preset: str, settings: list[str], answer: str) -> None:
     with pytest.raises(UsageError) as error:
         load_config(preset, settings)
     assert answer in str(error.value)
+
+
+def test_target_points_are_left_out_by_one_setting() -> None:
+    assert load_config("best", ["model.target_points=0"]).model == EgocentricConfig(target_points=0)
+    found = load_config("best", ["model.target_points=1", "model.target_weight=0.2", "model.target_hidden=8"]).model
+    assert found == EgocentricConfig(target_points=1, target_weight=0.2, target_hidden=(8,))
 
 
 def test_another_family_keeps_what_both_have_and_has_its_own_defaults() -> None:

@@ -173,8 +173,10 @@ def _converted(key: str, value: Any, hint: Any, bounds: Bounds) -> Any:
 def _list(key: str, value: Any, kind: Any, bounds: Bounds) -> tuple[Any, ...]:
     if isinstance(value, str):  # --set model.all_types=kick,stamina
         # Words that are not chosen from a list may hold a comma.
-        parts = value.split(",") if bounds.choices or kind is not str else [value]
-        value = [value_of(part.strip()) for part in parts if part.strip()]
+        parts = [part.strip() for part in (value.split(",") if bounds.choices or kind is not str else [value])]
+        if "" in parts and len(parts) > 1:
+            raise UsageError(f"{key}: expected a value on both sides of each comma, got {value!r}")
+        value = [value_of(part) for part in parts if part]
     values = value if isinstance(value, list | tuple) else [value]
     converted = tuple(_scalar(key, part, kind, bounds) for part in values)
     if bounds.items is not None and len(converted) != bounds.items:

@@ -122,6 +122,7 @@ def test_overrides_are_read_as_their_setting_wants() -> None:
         ("model.all_types=kik", "model.all_types: no 'kik'; did you mean kick?"),
         ("model.all_types=kick,kick", "model.all_types: names one more than once"),
         ("model.hidden=[]", "model.hidden: expected at least one value, got none"),
+        ("model.hidden=512,,3", "model.hidden: expected a value on both sides of each comma, got '512,,3'"),
         ("model.hidden=[0]", "model.hidden: expected at least 1, got 0"),
         ("model.family=papr", "model.family: no 'papr'; did you mean paper?"),
         ("model.kick_dropout=0.1", "no setting 'model.kick_dropout'; it is of the family egocentric, this is paper"),

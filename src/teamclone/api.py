@@ -27,6 +27,9 @@ class LoadedClone:
     def __init__(self, run: Run, model: Clone) -> None:
         self.run, self.model = run, model
 
+    def __repr__(self) -> str:
+        return f"LoadedClone({self.run.path}, {self.model.config.family}, of {self.run.team})"
+
     @property
     def commands(self) -> tuple[str, ...]:
         """The commands that the clone predicts."""

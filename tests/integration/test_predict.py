@@ -69,6 +69,10 @@ def table(clone: tc.LoadedClone, log: Path) -> pa.Table:
     return clone.predict(log, team="HELIOS_base").to_arrow()
 
 
+def test_a_loaded_clone_says_what_it_is(clone: tc.LoadedClone) -> None:
+    assert repr(clone) == f"LoadedClone({clone.run.path}, egocentric, of HELIOS_base)"
+
+
 def rounded(*arguments: Any, **settings: Any) -> World:
     """A view with the measured channels in the steps of a dataset."""
     world = view_columns(*arguments, **settings)

@@ -71,11 +71,11 @@ class GameLog:
     server_version: str | None = None
     left: Team
     right: Team
-    frames: Columns
-    players: Columns
-    player_types: Columns
-    server_params: dict[str, float | str]
-    player_params: dict[str, float | str]
+    frames: Columns = field(repr=False)
+    players: Columns = field(repr=False)
+    player_types: Columns = field(repr=False)
+    server_params: dict[str, float | str] = field(repr=False)
+    player_params: dict[str, float | str] = field(repr=False)
     complete: bool
     problems: tuple[Problem, ...] = ()
 
@@ -91,15 +91,15 @@ class CommandLog:
         has_stoppage: the log stamps lines with the stoppage counter (servers 13 and later).
     """
 
-    commands: Columns
-    text: bytes
-    events: Columns
-    event_texts: tuple[str, ...]
+    commands: Columns = field(repr=False)
+    text: bytes = field(repr=False)
+    events: Columns = field(repr=False)
+    event_texts: tuple[str, ...] = field(repr=False)
     has_stoppage: bool
     problems: tuple[Problem, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Match:
     """One match: game log and command log bound together.
 
@@ -117,6 +117,11 @@ class Match:
     game: GameLog
     log: CommandLog | None
     problems: tuple[Problem, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        cycle, names = self.frames["cycle"], [team.name or "nobody" for team in (self.left, self.right)]
+        score, cycles = f"{self.left.score}:{self.right.score}", int(cycle[-1]) if len(cycle) else 0
+        return f"Match({names[0]} {score} {names[1]}, {cycles:,} cycles, {self.match_id})"
 
     @property
     def left(self) -> Team:

@@ -59,7 +59,7 @@ def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
         "path": str(base.path),
         "checkpoint": CHECKPOINT,
         "model_id": model_id(model),
-        "team": base.environment["dataset"].get("team"),
+        "team": base.team,
         "trained_on": _trained_on(base),
     }
     return config, Base(model=model, origin=origin)

@@ -105,6 +105,11 @@ class Run:
         return str(self.environment["dataset"]["id"])
 
     @property
+    def team(self) -> str:
+        """The team or teams of that dataset."""
+        return str(self.environment["dataset"]["team"])
+
+    @property
     def metrics_path(self) -> Path:
         """The file of `history`."""
         return self.path / "metrics.jsonl"
@@ -181,7 +186,7 @@ def open_run(path: Path | str) -> Run:
         again="train again",
     )
     try:
-        _ = environment["dataset"]["path"], environment["dataset"]["id"]
+        _ = [environment["dataset"][name] for name in ("path", "id", "team")]
     except (TypeError, KeyError) as error:
         raise RunError(not_a_document(environment_path, "the description of a run", error)) from None
     if not config_path.is_file():

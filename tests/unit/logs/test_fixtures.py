@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,27 @@ def test_what_a_fixture_holds(match_of: MatchOf, name: str):
     assert (len(cycle), len(match.commands["kind"])) == (n_frames, n_commands)
     assert {problem.code for problem in match.problems} == PROBLEMS.get(name, set())
     assert match.game.complete == (name != "killed")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("realtime", "HELIOS_base 1:0 WEBase, 300 cycles"),
+        ("onesided", "HELIOS_base 0:0 nobody, 100 cycles"),
+    ],
+)
+def test_a_match_says_what_it_is_in_one_line(match_of: MatchOf, name: str, text: str):
+    match = match_of(name)
+    assert repr(match) == f"Match({text}, {match.match_id})"
+    assert len(repr(match.game)) < 1000
+    assert len(repr(match.log)) < 1000
+
+
+def test_a_match_without_frames_says_so(match_of: MatchOf):
+    match = match_of("realtime")
+    none = {name: values[:0] for name, values in match.frames.items()}
+    empty = replace(match, game=replace(match.game, frames=none))
+    assert repr(empty) == f"Match(HELIOS_base 1:0 WEBase, 0 cycles, {match.match_id})"
 
 
 @pytest.mark.parametrize("name", FACTS)

@@ -23,6 +23,7 @@ from teamclone.errors import DatasetError
 from teamclone.models.inputs.paper import BODY_LIMIT_DEG, PaperFeatures, TypeParameters, logged_ball_speed_max
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import FIELDS
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.world.channels import TYPE_FIELD
 
 _VX, _VY, _BODY = (MEASURED_INDEX[name] for name in ("vx", "vy", "body"))
@@ -30,6 +31,9 @@ _TYPE = CATEGORICAL_INDEX["type"]
 _VELOCITY_STEP, _BODY_STEP = STEPS[_VX], STEPS[_BODY]
 _MAX_X, _MAX_Y, _BODY_LIMIT = (np.float32(limit) for limit in (pitch.MAX_X, pitch.MAX_Y, BODY_LIMIT_DEG))
 _NAN = np.float32(math.nan)
+
+_X, _Y, _BODY_AT, _VX_AT, _VY_AT, _OWN = range(4, 4 + 6 * N_PLAYERS, N_PLAYERS)
+"""First columns of what `PaperFeatures` has of all players, behind the ball's four, and then of the actor."""
 
 _FAR, _NEAR = 16, 4
 """How many samples ahead a sample's own entries and those of its frame are prefetched.
@@ -128,11 +132,11 @@ def _gather(
 ) -> int:
     """Fill ``out``, (len(rows), columns); return the number of rows before the first that points at nothing."""
     n_samples, n_frames = len(sample_frame), len(frame_match)
-    place = np.empty(22, np.int64)
+    place = np.empty(N_PLAYERS, np.int64)
     value, bound = np.empty_like(mean), np.ones_like(mean)
     bound[0], bound[1] = _MAX_X, _MAX_Y
-    bound[4:26], bound[26:48], bound[48:70] = _MAX_X, _MAX_Y, _BODY_LIMIT
-    bound[114], bound[115], bound[116] = _MAX_X, _MAX_Y, _BODY_LIMIT
+    bound[_X:_Y], bound[_Y:_BODY_AT], bound[_BODY_AT:_VX_AT] = _MAX_X, _MAX_Y, _BODY_LIMIT
+    bound[_OWN], bound[_OWN + 1], bound[_OWN + 2] = _MAX_X, _MAX_Y, _BODY_LIMIT
     for index in range(len(rows)):
         if index + _FAR < len(rows) and 0 <= rows[index + _FAR] < n_samples:
             _prefetch(sample_frame, rows[index + _FAR])
@@ -142,7 +146,7 @@ def _gather(
             _prefetch(frame_match, frame)
             _prefetch(ball, frame * 4)
             for line in range(_POSITION_LINES):
-                _prefetch(position, frame * 44 + line * 16)
+                _prefetch(position, frame * 2 * N_PLAYERS + line * 16)
             for line in range(_DETAIL_LINES):
                 _prefetch(measured, frame * measured.shape[1] * measured.shape[2] + line * 32)
             for line in range(_CODE_LINES):
@@ -152,37 +156,37 @@ def _gather(
         if row < 0 or row >= n_samples:
             return index
         frame, actor = np.int64(sample_frame[row]), sample_player[row]
-        if frame < 0 or frame >= n_frames or actor >= 22:
+        if frame < 0 or frame >= n_frames or actor >= N_PLAYERS:
             return index
         first = np.int64(frame_match[frame]) * types_per_match
         if first < 0 or first >= len(speed):
             return index
         value[:4] = ball[frame]
         bound[2] = bound[3] = ball_speed[frame_match[frame]]
-        for player in range(22):
+        for player in range(N_PLAYERS):
             channels = measured[frame, player]
             if categorical[frame, player, _TYPE] >= types_per_match:
                 return index
             kind = first + np.int64(categorical[frame, player, _TYPE])
             place[player] = kind
             vx, vy, body = channels[_VX], channels[_VY], channels[_BODY]
-            value[4 + player] = position[frame, player, 0]
-            value[26 + player] = position[frame, player, 1]
-            value[48 + player] = _NAN if body == MISSING else np.float32(body) * _BODY_STEP
-            value[70 + player] = _NAN if vx == MISSING else np.float32(vx) * _VELOCITY_STEP
-            value[92 + player] = _NAN if vy == MISSING else np.float32(vy) * _VELOCITY_STEP
-            bound[70 + player] = speed[kind]
-            bound[92 + player] = speed[kind]
+            value[_X + player] = position[frame, player, 0]
+            value[_Y + player] = position[frame, player, 1]
+            value[_BODY_AT + player] = _NAN if body == MISSING else np.float32(body) * _BODY_STEP
+            value[_VX_AT + player] = _NAN if vx == MISSING else np.float32(vx) * _VELOCITY_STEP
+            value[_VY_AT + player] = _NAN if vy == MISSING else np.float32(vy) * _VELOCITY_STEP
+            bound[_VX_AT + player] = speed[kind]
+            bound[_VY_AT + player] = speed[kind]
         for channel in range(5):
-            value[114 + channel] = value[4 + 22 * channel + actor]
-        bound[117] = speed[place[actor]]
-        bound[118] = speed[place[actor]]
-        column = 119
+            value[_OWN + channel] = value[_X + N_PLAYERS * channel + actor]
+        bound[_OWN + 3] = speed[place[actor]]
+        bound[_OWN + 4] = speed[place[actor]]
+        column = _OWN + 5
         for field in range(len(own_field)):
             value[column] = (parameters[place[actor], own_field[field]] - own_middle[field]) / own_half[field]
             column += 1
         for field in range(len(all_field)):
-            for player in range(22):
+            for player in range(N_PLAYERS):
                 value[column] = (parameters[place[player], all_field[field]] - all_middle[field]) / all_half[field]
                 column += 1
         for column in range(len(mean)):

@@ -10,6 +10,7 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.layout import (
     CATEGORICAL_INDEX,
+    FORMAT,
     FRAME_ARRAYS,
     MEASURED_INDEX,
     MISSING,
@@ -233,7 +234,7 @@ def test_missing_foreign_or_other_format(tmp_path: Path) -> None:
     document = tiny(tmp_path / "ds") / "dataset.json"
     meta = json.loads(document.read_text())
     document.write_text(json.dumps(meta | {"format": 99}))
-    with pytest.raises(DatasetError, match=r"dataset of format 99, this version reads 3; make it again"):
+    with pytest.raises(DatasetError, match=f"dataset of format 99, this version reads {FORMAT}; make it again"):
         open_dataset(tmp_path / "ds")
     for text in ("{", "[]", "{}", "3"):
         document.write_text(text)

@@ -16,6 +16,7 @@ from teamclone.models.clone import Clone, parameter_count
 from teamclone.models.config import ACTIVATIONS, EgocentricConfig
 from teamclone.search.strategies import Beam, Optimisers, Strategy, Study
 from teamclone.search.trials import (
+    FORMAT,
     Mode,
     Objective,
     Search,
@@ -289,8 +290,8 @@ def test_a_folder_that_is_no_search_is_refused(tmp_path: Path) -> None:
     for text, words in (
         ("[]", "not the description of a search"),
         ("{", "not the description of a search"),
-        (json.dumps({"format": 2, "mode": "beam"}), "not the description of a search"),
-        (json.dumps({"format": 99}), "search of format 99, this version reads 2"),
+        (json.dumps({"format": FORMAT, "mode": "beam"}), "not the description of a search"),
+        (json.dumps({"format": 99}), f"search of format 99, this version reads {FORMAT}"),
     ):
         (tmp_path / "search.json").write_text(text)
         with pytest.raises(RunError, match=words):

@@ -15,7 +15,7 @@ from teamclone.errors import RunError
 from teamclone.models.clone import Clone
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import Config, load_config
-from teamclone.training.run import create_run, locked, open_run
+from teamclone.training.run import FORMAT, create_run, locked, open_run
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +60,8 @@ def test_missing_foreign_or_other_format(tmp_path: Path, dataset: Dataset, confi
         open_run(tmp_path)
     run = create_run(tmp_path / "run", config, dataset, device="cpu", precision="fp32")
     environment = run.path / "environment.json"
-    environment.write_text(json.dumps(run.environment | {"format": 7}))
-    with pytest.raises(RunError, match="run of format 7, this version reads 4"):
+    environment.write_text(json.dumps(run.environment | {"format": 99}))
+    with pytest.raises(RunError, match=f"run of format 99, this version reads {FORMAT}"):
         open_run(run.path)
     for text in ("{", "[]", "{}"):
         environment.write_text(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,10 @@ def verdict(
     """
     if match is None or holes is None or problem:
         return FailedError(Fault.BAD_LOGS, problem or "the game log has no frame")
-    last, cycles = int(match.frames["cycle"][-1]), _cycles(match)
+    try:
+        last, cycles = int(match.frames["cycle"][-1]), _cycles(match)
+    except ValueError as error:
+        return FailedError(Fault.BAD_LOGS, str(error))
     if not match.game.complete or match.frames["playmode"][-1] != PlayMode.TIME_OVER or last < cycles:
         if gave_up:
             there = (match.players["state"][-1] & state_bits.STAND) != 0
@@ -61,10 +65,19 @@ def verdict(
 
 
 def _cycles(match: Match) -> int:
-    """Return how many cycles the regular halves have, as the server counts them (`serverparam.cpp`)."""
-    params = match.game.server_params
-    per_half = int(number(params, "half_time") * 1000 / number(params, "simulator_step") + 0.5)
-    return per_half * int(number(params, "nr_normal_halfs"))
+    """Return how many cycles the regular halves have, as the server counts them (`serverparam.cpp`).
+
+    0 or less where ``half_time`` is: then no match is too short, and its play mode alone says whether it ended.
+
+    Raises:
+        ValueError: the log's parameters give no number of cycles; the text names them.
+    """
+    names = ("half_time", "simulator_step", "nr_normal_halfs")
+    half, step, halves = (number(match.game.server_params, name) for name in names)
+    if not (math.isfinite(half) and math.isfinite(halves) and math.isfinite(step) and step > 0):
+        found = ", ".join(f"{name} {value:g}" for name, value in zip(names, (half, step, halves), strict=True))
+        raise ValueError(f"the game log gives the match no length: expected numbers, the step above 0, got {found}")
+    return int(half * 1000 / step + 0.5) * int(halves)
 
 
 def _blame(fixture: Fixture, flags: NDArray[np.bool_], fault: Fault, text: str) -> FailedError | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from teamclone.logs import read_match
 from teamclone.logs.match import Match
 from teamclone.play.holes import count_holes
 from teamclone.play.ports import DEFAULT_PORT, held_ports, is_free
-from teamclone.play.record import Fault, Record, Side, Trouble, load_record, save_record
+from teamclone.play.record import FORMAT, Fault, Record, Side, Trouble, load_record, save_record
 from teamclone.play.schedule import Fixture, Limits, ServerSpec, TeamSpec
 from teamclone.play.server import find_server, gave_up, last_words, met_taken_port, programs_of, server_report
 from teamclone.play.verdict import verdict
@@ -94,7 +95,9 @@ def test_a_damaged_or_foreign_record_is_told_with_its_path(tmp_path: Path) -> No
     with pytest.raises(PlayError, match=r"match\.json: is damaged .* remove its folder"):
         load_record(tmp_path)
     (tmp_path / "match.json").write_text('{"format": 99}')
-    with pytest.raises(PlayError, match=r"match record of format 99, this version reads 2; choose another --out"):
+    with pytest.raises(
+        PlayError, match=f"match record of format 99, this version reads {FORMAT}; choose another --out"
+    ):
         load_record(tmp_path)
 
 
@@ -164,6 +167,39 @@ def judged(match: Match, *, gave_up: bool = False) -> tuple[str, int | None, tup
 @pytest.mark.parametrize("gave_up", [False, True])
 def test_a_match_that_was_played_to_its_end_is_one(samples_dir: Path, gave_up: bool) -> None:
     assert judged(played(samples_dir), gave_up=gave_up) is None
+
+
+def with_params(match: Match, **params: float) -> Match:
+    return replace(match, game=replace(match.game, server_params=match.game.server_params | params))
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"half_time": math.nan},
+        {"half_time": math.inf},
+        {"simulator_step": 0.0},
+        {"simulator_step": math.nan},
+        {"nr_normal_halfs": math.nan},
+    ],
+)
+def test_a_log_that_gives_the_match_no_length_is_bad(samples_dir: Path, params: dict[str, float]) -> None:
+    match = with_params(played(samples_dir), **params)
+    found = verdict(FIXTURE, match, count_holes(match), None, gave_up=False)
+    assert found is not None
+    assert found.fault is Fault.BAD_LOGS
+    ((name, value),) = params.items()
+    assert "the game log gives the match no length" in str(found)
+    assert f"{name} {value:g}" in str(found)
+
+
+@pytest.mark.parametrize("half_time", [0.0, -1.0])
+def test_without_a_length_of_halves_the_play_mode_says_whether_a_match_ended(
+    samples_dir: Path, half_time: float
+) -> None:
+    assert judged(with_params(played(samples_dir), half_time=half_time)) is None
+    early = with_params(played(samples_dir, frames=500), half_time=half_time)
+    assert judged(early) == (Fault.BAD_LOGS, None, ())
 
 
 def test_a_match_that_ends_early_is_none(samples_dir: Path) -> None:

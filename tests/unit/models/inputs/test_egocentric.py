@@ -13,6 +13,7 @@ from teamclone.models.inputs.egocentric import CLIP, NEAREST_OPPONENTS, PAST_FRA
 from teamclone.models.inputs.geometry import GEOMETRY, MATES, TACKLE, WAY
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.world.channels import (
     CHANNEL,
     FLAG_CHARGED,
@@ -461,6 +462,18 @@ MEETING = {"core", "reach", "geometry", "lines", "mates", "opponents", "rivals"}
 """Blocks that hang on times to the ball, which hang on where everybody is."""
 
 
+def of_server(state: State, name: str) -> Tensor:
+    """(frames,) a parameter of the server, to change in place."""
+    return state.server[:, SERVER_FIELD[name]]
+
+
+def renumbered(state: State, one: int, other: int) -> None:
+    """Exchange two team mates in all that is known of players; the actor ``one`` is then ``other``."""
+    for players in (state.players, state.types, state.past_players.transpose(1, 2)):
+        players[:, [one, other]] = players[:, [other, one]]
+    state.actor[state.actor == one] = other
+
+
 @pytest.mark.parametrize(
     ("what", "change", "must", "may"),
     [
@@ -491,6 +504,20 @@ MEETING = {"core", "reach", "geometry", "lines", "mates", "opponents", "rivals"}
         ("its cycles", lambda s: s.mode_cycles.add_(3), {"mode"}, set()),
         ("goalkeeper", lambda s: s.players[:, 2, CHANNEL["flags"]].add_(FLAG_GOALIE), {"mode"}, set()),
         ("others' past", lambda s: s.past_players[:, :, 3:, CHANNEL["x"]].add_(0.5), set(), set()),
+        ("actor", lambda s: s.actor.fill_(3), {*PARTS} - {"mode"}, set()),
+        ("unum", lambda s: renumbered(s, 2, 3), {"role"}, set()),
+        ("ball size", lambda s: of_server(s, "ball_size").mul_(0.97), {"ball", "reach", "geometry"}, MEETING),
+        ("ball decay", lambda s: of_server(s, "ball_decay").mul_(0.97), MEETING, set()),
+        ("ball speed", lambda s: of_server(s, "ball_speed_max").mul_(0.97), {"geometry"}, set()),
+        ("most stamina", lambda s: of_server(s, "stamina_max").mul_(0.97), {"self"}, set()),
+        ("most capacity", lambda s: of_server(s, "stamina_capacity").mul_(0.97), {"self"}, set()),
+        ("effort rises", lambda s: of_server(s, "effort_inc_thr").mul_(0.97), {"self"}, set()),
+        ("stamina tires", lambda s: of_server(s, "recover_dec_thr").fill_(4900 / 8000), {"self"}, set()),
+        ("tackle", lambda s: of_server(s, "tackle_dist").mul_(0.97), {"ball"}, set()),
+        ("tackle back", lambda s: of_server(s, "tackle_back_dist").add_(0.5), {"ball"}, set()),
+        ("tackle width", lambda s: of_server(s, "tackle_width").mul_(0.97), {"ball"}, set()),
+        ("player noise", lambda s: of_server(s, "player_rand").mul_(0.97), set(), set()),
+        ("half time", lambda s: of_server(s, "half_time").mul_(0.97), set(), set()),
     ],
 )  # fmt: skip
 def test_each_value_moves_its_own_blocks_only(

@@ -2,8 +2,7 @@
 
 Rules, thresholds and allowances are those of the public sources named below, of HELIOS Base and of its library librcsc
 (Akiyama et al., github.com/helios-base). The code is ours: motion, dashes, turns and tackles from the physics of the
-server, candidates as tables of which the best is taken. `kick_table._add` with `best_sequence`, `plan._shoot` and the
-order of steps in `players.arrival` still follow the original; do not export them before they are written anew.
+server, candidates and sequences of kicks as tables of which the best is taken.
 
 helios-base at commit 66fd63d6f9d022423b8c4430668a2b8510353caf (5 October 2025):
 

@@ -57,8 +57,6 @@ PLACES = sum(COUNTS)
 PLACE_PART = np.repeat(RING_PARTS, COUNTS)
 PLACE_DEG = np.concatenate([360.0 / count * np.arange(count) - 180.0 for count in COUNTS])
 """(PLACES,) of each place the ring and the degrees from the body."""
-SINGLES = np.stack([np.arange(PLACES)] * 2, axis=1)
-"""(PLACES, 2) each place as the pair of two kicks, which is one place."""
 OFF_M, WITHIN_M = 0.1, 0.2
 """Metres by which a place is at least beyond touch, and within reach."""
 DIRECTIONS, PAIRS = 72, 1024
@@ -234,15 +232,15 @@ def _kicked_on(place: Array, target: Target) -> Array:
 
 
 @kernel
-def _stages(scene: Array, target: Target, most: int) -> Stages:
-    """Return where the ball may be before each of at most ``most`` kicks."""
+def _stages(scene: Array, target: Target) -> Stages:
+    """Return where the ball may be before each kick."""
     me, ball, server = scene[ACTOR], scene[BALL], scene[SERVER]
     place, gain = np.empty((3, PLACES, 2)), np.empty((3, PLACES))
     lies, rolls = np.zeros((3, PLACES), np.int64), np.zeros((3, PLACES), np.int64)
     sent, opens, missed = np.empty((PLACES, 2)), np.empty(PLACES, np.bool_), np.empty(PLACES)
     place[0, 0, 0], place[0, 0, 1], gain[0, 0] = ball[X], ball[Y], ball[GAIN]
     noise = kick_noise(scene)
-    for index in range(PLACES if most > 1 else 0):
+    for index in range(PLACES):
         metres = min(max(me[TOUCH] + OFF_M, me[TOUCH] + me[MARGIN] * PLACE_PART[index]), me[AREA] - WITHIN_M)
         for stage in range(1, 3):
             x, y = beside(me, stage, metres, me[BODY] + PLACE_DEG[index])
@@ -253,7 +251,7 @@ def _stages(scene: Array, target: Target, most: int) -> Stages:
         sent[index, 0], sent[index, 1] = vx, vy
         opens[index] = added <= most_acceleration(server, ball[GAIN])
         missed[index] = metres + aim_error(scene, noise, math.hypot(vx, vy), added) - me[AREA]
-    for stage in range(most):
+    for stage in range(3):
         places = place[stage, : PLACES if stage else 1]
         _perils(scene, places, 1, LIES, lies[stage])
         _perils(scene, _kicked_on(places, target), stage + 1, ROLLS, rolls[stage])
@@ -305,102 +303,136 @@ def _worth(target: Target, kicks: int, speed: float, power: float, perils: int) 
     return 1.0 - slow - hard - KICKS_PRICE[kicks - 1] - PRICE[int(several), perils] - POWER_PRICE * power
 
 
-class Table(NamedTuple):
-    """Sequences of kicks that may be chosen.
+class Sequences(NamedTuple):
+    """All sequences of kicks: the single kick, two kicks by each place, three kicks by each pair of places.
 
     Attributes:
-        speed: (n,) metres per cycle that the last kick gives. worth: (n,) see `_worth`.
-        first: (n,) place to which the first kick brings the ball; -1 of one that goes to the target.
-        filled: (1,) rows that are filled.
+        kicks: (n,) 1, 2 or 3. first: (n,) place to which the first of several kicks brings the ball.
+        speed, power: (n,) of the last kick, metres per cycle and units; a speed of 0 where a kick cannot be given.
+        perils: (n,) of the ball on its way, without those of where it is now for several kicks.
     """
 
-    speed: Array
-    worth: Array
+    kicks: Ints
     first: Ints
-    filled: Ints
-
-
-class Search(NamedTuple):
-    """Sequences that are to be tried.
-
-    Attributes:
-        kicks: 2 or 3. barred: perils that exclude a place.
-        pairs: (n, 2) places after the first kick and before the last; of two kicks one place, twice.
-    """
-
-    kicks: int
-    barred: int
-    pairs: Ints
+    speed: Array
+    power: Array
+    perils: Ints
 
 
 @kernel
-def _add(scene: Array, stages: Stages, target: Target, search: Search, table: Table) -> None:
-    """Add the possible sequences of a search to a table.
+def _sequences(scene: Array, stages: Stages, target: Target, pairs: Ints) -> Sequences:
+    """Return all sequences.
 
-    Of those that fall short only ever faster ones are added, and none of three kicks once the wanted speed is reached.
-    Each takes the row of the sequence before it, but for the first of two kicks.
+    Args:
+        pairs: (PAIRS, 2) places to which the first and the second of three kicks bring the ball.
     """
-    kicks, barred, pairs = search
-    count = table.filled[0]
-    server = scene[SERVER]
-    begun = (stages.lies[0, 0] | stages.rolls[0, 0]) & ~CUT_OFF
-    enough = ENOUGH if kicks == 3 else PLACES
-    full, fastest_short, way = 0, 0.0, 0
-    while way < len(pairs) and full < enough:
-        first, last = pairs[way]
-        way += 1
-        perils = stages.lies[kicks - 1, last] | stages.rolls[kicks - 1, last]
-        if kicks == 3:
-            perils |= stages.lies[1, first] | (stages.rolls[1, first] & ~CUT_OFF)
-        if not stages.opens[first] or perils & barred:
-            continue
-        possible, vx, vy = _comes(server, stages, kicks, first, last)
-        if not possible:
-            continue
-        gain = stages.gain[kicks - 1, last]
-        speed, power = _last_kick(server, stages.place[kicks - 1, last], gain, (vx, vy), target)
-        short = speed < target.speed
-        if short and (speed <= fastest_short or (kicks == 3 and full > 0)):
-            continue
-        missed = not short and stages.missed[first] > -ROOM_M[kicks - 2]
-        row = max(0, count - 1) if short and (kicks == 3 or fastest_short > 0.0) else count
-        full, fastest_short = full + (not short), speed if short else fastest_short
-        table.speed[row], table.first[row] = speed, first
-        table.worth[row] = _worth(target, kicks, speed, power, perils | begun | MISSED * missed)
-        count = row + 1
-    table.filled[0] = count
+    server, ball = scene[SERVER], scene[BALL]
+    kicks = np.repeat(np.array([1, 2, 3]), np.array([1, PLACES, len(pairs)]))
+    first = np.concatenate((np.zeros(1, np.int64), np.arange(PLACES), pairs[:, 0]))
+    last = np.concatenate((np.zeros(1, np.int64), np.arange(PLACES), pairs[:, 1]))
+    speed, power, perils = np.zeros(len(kicks)), np.zeros(len(kicks)), np.zeros(len(kicks), np.int64)
+    for row in range(len(kicks)):
+        stage, place = kicks[row] - 1, last[row]
+        perils[row] = stages.lies[stage, place] | stages.rolls[stage, place]
+        if stage == 2:
+            perils[row] |= stages.lies[1, first[row]] | (stages.rolls[1, first[row]] & ~CUT_OFF)
+        possible, vx, vy = True, ball[VX], ball[VY]
+        if stage > 0:
+            if perils[row] & NEVER:
+                continue
+            possible, vx, vy = _comes(server, stages, stage + 1, first[row], place)
+        if possible:
+            gain = stages.gain[stage, place]
+            speed[row], power[row] = _last_kick(server, stages.place[stage, place], gain, (vx, vy), target)
+    return Sequences(kicks, first, speed, power, perils)
 
 
 @kernel
-def best_sequence(scene: Array, order: Ints, target: Target, most: int) -> tuple[float, float, float]:
+def _two_kicks(speed: Array, wanted: float) -> Ints:
+    """Return the indices of the sequences of two kicks that count, in order.
+
+    All that have the wanted speed do. Of the others those that are faster than all others before them; from the second
+    of these on, each one takes the place of the index before it.
+    """
+    short = np.flatnonzero((speed > 0.0) & (speed < wanted))
+    most = np.zeros(len(short) + 1)
+    for place, index in enumerate(short):
+        most[place + 1] = max(most[place], speed[index])
+    short = short[most[1:] > most[:-1]]
+    counts, takes = speed >= wanted, np.zeros(len(speed) + 1, np.bool_)
+    counts[short], takes[short[1:]] = True, True
+    indices = np.flatnonzero(counts)
+    following = np.append(indices, len(speed))[1:]
+    return indices[~takes[following]]
+
+
+@kernel
+def _three_kicks(speed: Array, wanted: float) -> tuple[Ints, Ints]:
+    """Return the indices of the sequences of three kicks that count, in order.
+
+    Returns:
+        The fastest before the first that has the wanted speed, if any; and at most ENOUGH that have it.
+    """
+    full = np.flatnonzero(speed >= wanted)
+    before = speed[: full[0]] if len(full) > 0 else speed
+    short = np.flatnonzero(before == before.max())[:1] if before.any() else full[:0]
+    return short, full[:ENOUGH]
+
+
+@kernel
+def _counting(rows: Ints, table: Sequences, wanted: float, barred: int) -> Ints:
+    """Return rows of the table, and after them those of several kicks that no barred peril excludes and that count.
+
+    A sequence of three kicks that falls short takes the place of the row before it.
+    """
+    speed = np.where(table.perils & barred, 0.0, table.speed)
+    rows = np.concatenate((rows, 1 + _two_kicks(speed[1 : 1 + PLACES], wanted)))
+    short, full = _three_kicks(speed[1 + PLACES :], wanted)
+    return np.concatenate((rows[: max(0, len(rows) - len(short))], 1 + PLACES + short, 1 + PLACES + full))
+
+
+@kernel
+def cut_off(scene: Array, target: Target) -> bool:
+    """Return whether an opponent has the ball in the cycle after it is kicked towards a target."""
+    perils = np.zeros(1, np.int64)
+    _perils(scene, _kicked_on(scene[BALL, X : Y + 1].copy().reshape(1, 2), target), 1, ROLLS, perils)
+    return perils[0] & CUT_OFF > 0
+
+
+@kernel
+def best_sequence(scene: Array, order: Ints, target: Target) -> tuple[float, float, float]:
     """Return the speed that the best of all sequences gives the ball, and its velocity after the first kick.
 
     All in metres per cycle, all 0 where no sequence is possible. Risks are taken only where nothing else is fast
     enough.
 
     Args:
-        order: see `kick_order`. most: kicks, 1 or 3.
+        order: see `kick_order`.
     """
     me, ball = scene[ACTOR], scene[BALL]
-    stages = _stages(scene, target, most)
-    most_rows = 1 if most == 1 else 1 + 2 * (PLACES + PAIRS)
-    table = Table(np.empty(most_rows), np.empty(most_rows), np.empty(most_rows, np.int64), np.zeros(1, np.int64))
-    speed, power = _last_kick(scene[SERVER], stages.place[0, 0], ball[GAIN], (ball[VX], ball[VY]), target)
-    perils = stages.lies[0, 0] | stages.rolls[0, 0]
-    table.speed[0], table.worth[0], table.first[0] = speed, _worth(target, 1, speed, power, perils), -1
-    table.filled[0] = 0 if perils & CUT_OFF else 1
     facing = turned(direction(target.x - me[X], target.y - me[Y]) - me[BODY])
     pairs = order[int(np.rint(DIRECTIONS * (facing + 180.0) / 360.0)) % DIRECTIONS]
-    for barred in (NEVER | RISKS, NEVER):
-        if most > 1 and (barred & RISKS or not (table.speed[: table.filled[0]] > target.enough).any()):
-            _add(scene, stages, target, Search(2, barred, SINGLES), table)
-            _add(scene, stages, target, Search(3, barred, pairs), table)
-    count = table.filled[0]
-    if count == 0:
+    stages = _stages(scene, target)
+    table = _sequences(scene, stages, target, pairs)
+    single = np.zeros(0 if table.perils[0] & CUT_OFF else 1, np.int64)
+    rows = _counting(single, table, target.speed, NEVER | RISKS)
+    if not (table.speed[rows] > target.enough).any():
+        rows = _counting(rows, table, target.speed, NEVER)
+    begun = table.perils[0] & ~CUT_OFF
+    best, most = -1, -np.inf
+    for row in rows:
+        kicks, speed, perils = table.kicks[row], table.speed[row], table.perils[row]
+        if kicks > 1:
+            perils |= begun
+            if speed >= target.speed and stages.missed[table.first[row]] > -ROOM_M[kicks - 2]:
+                perils |= MISSED
+        worth = _worth(target, kicks, speed, table.power[row], perils)
+        if worth > most:
+            best, most = row, worth
+    if best < 0:
         return 0.0, 0.0, 0.0
-    chosen = np.argmax(table.worth[:count])
-    speed, first = table.speed[chosen], table.first[chosen]
-    if first >= 0:
+    speed, first = table.speed[best], table.first[best]
+    if table.kicks[best] > 1:
         return speed, stages.sent[first, 0], stages.sent[first, 1]
     part = speed / gap(target.x, target.y, ball[X], ball[Y])
     return speed, part * (target.x - ball[X]), part * (target.y - ball[Y])

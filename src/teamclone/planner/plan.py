@@ -24,7 +24,7 @@ from teamclone.planner.dribble import best_dribble
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.hold_ball import hold_ball, stays
 from teamclone.planner.keep_dribble import underway
-from teamclone.planner.kick_table import ORDER_FIELDS, Target, best_sequence, kick_order
+from teamclone.planner.kick_table import ORDER_FIELDS, Target, best_sequence, cut_off, kick_order
 from teamclone.planner.passes import best_pass
 from teamclone.planner.scene import (
     ACTOR,
@@ -114,12 +114,11 @@ def _shoot(scene: Array, order: NDArray[np.int64]) -> tuple[bool, float, float]:
     x, y, speed, one = best_shot(scene)
     if speed == 0:
         return False, 0.0, 0.0
-    if one > ENOUGH_SHOT * speed:
-        enough = ENOUGH_SHOT * one - 1e-4
-        reached, vx, vy = best_sequence(scene, order, Target(x, y, one, enough), 1)
-        if reached >= enough:
-            return True, vx, vy
-    reached, vx, vy = best_sequence(scene, order, Target(x, y, speed, ENOUGH_SHOT * speed), 3)
+    ball, enough = scene[BALL], ENOUGH_SHOT * speed
+    if one > enough and not cut_off(scene, Target(x, y, one, one)):
+        part = one / gap(x, y, ball[X], ball[Y])
+        return True, part * (x - ball[X]), part * (y - ball[Y])
+    reached, vx, vy = best_sequence(scene, order, Target(x, y, speed, enough))
     return reached > 0, vx, vy
 
 
@@ -129,7 +128,7 @@ def _play(scene: Array, order: NDArray[np.int64], passed: Array) -> tuple[bool, 
     if passed[passes.KICKS] > 1:
         speed = passed[passes.SPEED]
         target = Target(passed[passes.TO_X], passed[passes.TO_Y], speed, ENOUGH_PASS * speed)
-        reached, vx, vy = best_sequence(scene, order, target, 3)
+        reached, vx, vy = best_sequence(scene, order, target)
         return reached >= target.enough, vx, vy
     angle = math.radians(passed[passes.DIRECTION])
     cos, sin = math.cos(angle), math.sin(angle)

@@ -41,6 +41,8 @@ HARDLY_M = 0.001
 """Metres that count as nothing."""
 FACED_DEG = 15.0
 """A player dashes without a turn to what is at most so far off its body."""
+MOST_LATE = 2
+"""Cycles by which players may be late that are told apart."""
 FROZEN_PART = 0.5
 """Of the server's tackle_cycles: how long a player that is tackling goes on with it, on average."""
 
@@ -123,31 +125,31 @@ def dashes(player: Array, metres: float) -> int:
 
 
 @kernel
-def arrival(scene: Array, player: Array, place: tuple[float, float], cycle: int, allowance: Allowance) -> int:
-    """Return after how many cycles a player has a ball that is in a place after ``cycle`` of them.
+def lateness(scene: Array, player: Array, place: tuple[float, float], cycle: int, allowance: Allowance) -> int:
+    """Return by how many cycles a player misses a ball that is in a place after ``cycle`` of them; 0 or less: has it.
 
-    Turns and dashes count from where the player drifts to by then. A player that turns sees the ball a cycle late; one
-    that is tackling lies first. NEVER_CYCLES if it is clearly more than ``cycle``.
+    The player has so many cycles, less those of its turns and of a tackle that still goes on. In what is left its
+    dashes have to cover the way from where it drifts to. NEVER_CYCLES if it is clearly too late.
     """
-    from_x, from_y = inertia_point(player, cycle)
-    way_x, way_y = place[0] - from_x, place[1] - from_y
-    metres, reach = math.hypot(way_x, way_y), reach_of(player, place[0], place[1])
+    drift_x, drift_y = inertia_point(player, cycle)
+    x, y = place[0] - drift_x, place[1] - drift_y
+    metres, reach = math.hypot(x, y), reach_of(player, place[0], place[1])
     if metres < reach + allowance.touch_m + HARDLY_M:
-        return 0
-    dash_m = metres - allowance.unsure * player[AWAY]
-    if cycle >= allowance.reach_from:
-        dash_m -= allowance.reach * reach + allowance.ahead_m
-    early = allowance.early + (place[0] < allowance.early_x) + (place[0] < allowance.earlier_x)
-    if dash_m > player[TOP] * (cycle + early + 2.0) or allowance.bound * (metres - reach) > player[TOP] * cycle:
+        return -cycle
+    stretched = allowance.reach * reach + allowance.ahead_m if cycle >= allowance.reach_from else 0.0
+    to_dash = metres - allowance.unsure * player[AWAY] - stretched
+    left = cycle + int(allowance.early + (place[0] < allowance.early_x) + (place[0] < allowance.earlier_x))
+    too_far = to_dash > player[TOP] * (left + MOST_LATE)
+    if too_far or allowance.bound * (metres - reach) > player[TOP] * cycle:
         return NEVER_CYCLES
-    off = abs(turned(direction(way_x, way_y) - player[BODY]))
-    if metres < allowance.back_m:
-        off = min(off, 180.0 - off)
-    count = turns(player, off, metres, reach + allowance.turn_m)
-    count += (count > 0) + dashes(player, dash_m)
     if player[FROZEN] > 0:
-        count += int(FROZEN_PART * scene[SERVER, TACKLE_CYCLES])
-    return count - int(early)
+        left -= int(FROZEN_PART * scene[SERVER, TACKLE_CYCLES])
+    off = abs(turned(direction(x, y) - player[BODY]))
+    backwards = metres < allowance.back_m and off > 90.0
+    turning = turns(player, 180.0 - off if backwards else off, metres, reach + allowance.turn_m)
+    if turning > 0:  # and sees the ball a cycle late
+        left -= turning + 1
+    return dashes(player, to_dash) - left
 
 
 @kernel
@@ -173,7 +175,7 @@ def intercept(scene: Array, player: Array, path: Path, cycles: tuple[int, int], 
     NEVER_CYCLES if in none of them.
     """
     for cycle in range(cycles[0], cycles[1] + 1):
-        if arrival(scene, player, ball_after(scene, path, cycle), cycle, allowance) <= cycle:
+        if lateness(scene, player, ball_after(scene, path, cycle), cycle, allowance) <= 0:
             return cycle
     return NEVER_CYCLES
 

@@ -11,7 +11,7 @@ from teamclone.planner.ball import ball_after, path_along
 from teamclone.planner.candidates import by_value, nothing
 from teamclone.planner.dribble import ARRIVES, COLUMNS, DIRECTION, SPEED, TO_X, TO_Y, meet
 from teamclone.planner.motion import dash_metres
-from teamclone.planner.players import SELF_PASS, SELF_PASS_AHEAD, arrival, bearing, pose_after
+from teamclone.planner.players import SELF_PASS, SELF_PASS_AHEAD, bearing, lateness, pose_after
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
@@ -62,7 +62,7 @@ def _free(scene: Array, one: Array) -> bool:
             return False
         before, _ = along(player[X] - ball[X], player[Y] - ball[Y], path.cos, path.sin)
         allowance = SELF_PASS_AHEAD if before > IN_THE_WAY_M else SELF_PASS
-        if before >= allowance.behind_m and arrival(scene, player, place, cycles, allowance) <= cycles:
+        if before >= allowance.behind_m and lateness(scene, player, place, cycles, allowance) <= 0:
             return False
     return True
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after, cycles_over, fastest_from
-from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, arrival, first_cycles
+from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, first_cycles, lateness
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
@@ -109,9 +109,9 @@ def _lateness(scene: Array, defenders: Indices, path: Path, cycles: int) -> tupl
             if first[place] > cycle:
                 continue
             if hands and scene[row, GOALKEEPER] > 0:
-                late = min(late[0], arrival(scene, scene[row], at, cycle, SHOT_GOALKEEPER) - cycle), late[1]
+                late = min(late[0], lateness(scene, scene[row], at, cycle, SHOT_GOALKEEPER)), late[1]
             else:
-                late = late[0], min(late[1], arrival(scene, scene[row], at, cycle, SHOT) - cycle)
+                late = late[0], min(late[1], lateness(scene, scene[row], at, cycle, SHOT))
         if min(late) <= 0:
             break
     return late

@@ -10,8 +10,8 @@ from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after, cycles_over
 from teamclone.planner.players import (
     HARDLY_M,
     TACKLE,
-    arrival,
     first_cycles,
+    lateness,
     tackle_chance,
 )
 from teamclone.planner.scene import (
@@ -78,7 +78,7 @@ def _opponents_after(scene: Array, path: Path) -> int:
     for cycle in range(1, min(CYCLES, out)):
         place = ball_after(scene, path, cycle)
         for row in rows[first <= cycle]:
-            if arrival(scene, scene[row], place, cycle, TACKLE) <= cycle:
+            if lateness(scene, scene[row], place, cycle, TACKLE) <= 0:
                 return cycle
     return NEVER_CYCLES
 

@@ -30,6 +30,11 @@ def radians(degrees: Value) -> Value:
     return degrees * (math.pi / 180.0)
 
 
+def degrees(angle: Value) -> Value:
+    """Return an angle in radians as degrees in [-180, 180)."""
+    return wrap(angle) * (180.0 / math.pi)
+
+
 def wrap(angle: Value) -> Value:
     """Return an angle in [-pi, pi)."""
     return _of(angle).remainder(angle + math.pi, 2 * math.pi) - math.pi
@@ -94,6 +99,47 @@ def kick_rate(
     off = off_angle(off_body) / math.pi
     gap = distance - player_size - ball_size
     return kick_power_rate * (1.0 - 0.25 * off - 0.25 * gap / kickable_margin)
+
+
+def kick_noise(
+    power: Value,
+    distance: Value,
+    off_body: Value,
+    ball_speed: Value,
+    *,
+    kick_rand: Value,
+    player_size: Value,
+    kickable_margin: Value,
+    server: Any,
+) -> Value:
+    """Return the greatest metres per cycle by which the server's noise changes what a kick gives the ball.
+
+    The formula is that of ``player.cpp``, kick. The noise has a random direction and a length uniform from 0 to this.
+
+    Args:
+        distance, off_body: see `kick_rate`.
+        ball_speed: as logged.
+        server: parameters of the server by name.
+    """
+    gap = distance - player_size - server["ball_size"]
+    where = 0.5 + 0.25 * (off_angle(off_body) / math.pi + gap / kickable_margin)
+    return kick_rand * abs(power) / server["maxpower"] * (where + _moving(ball_speed, server))
+
+
+def tackle_noise(failure: Value, ball_speed: Value, *, kick_rand: Value, server: Any) -> Value:
+    """Return the greatest metres per cycle by which the server's noise changes what a tackle gives the ball.
+
+    The formula is that of ``player.cpp``, tackle, for clients from version 12; see `kick_noise`.
+
+    Args:
+        failure: the probability that it fails, see `tackle_failure`.
+    """
+    return kick_rand * server["tackle_rand_factor"] * (1.0 - 0.5 * failure + _moving(ball_speed, server))
+
+
+def _moving(ball_speed: Value, server: Any) -> Value:
+    """Return the part of a kick's noise that comes from the ball's speed: half at rest, all at the greatest speed."""
+    return 0.5 + 0.5 * ball_speed / (server["ball_speed_max"] * server["ball_decay"])
 
 
 def limited(x: Value, y: Value, most: Value) -> tuple[Value, Value]:
@@ -164,6 +210,28 @@ def dash_rate(direction_deg: Value, *, side_dash_rate: Value, back_dash_rate: Va
     return xp.clip(xp.where(direction_deg <= 90.0, ahead, behind), 0.0, 1.0)
 
 
+def leg_costs(left: Value, right: Value, available: Value) -> tuple[Value, Value]:
+    """Return the stamina that each leg of a dash takes (``leg.cpp``).
+
+    A leg takes half its power, backwards all of it. Where less is available the right leg gets more than its share,
+    since the server divides by the left leg's cost after it was cut: a plain dash of an exhausted player turns it.
+
+    Args:
+        left, right: powers of the legs, 0 where one stands still; not both 0.
+        available: stamina and extra stamina.
+    """
+    xp = _of(left, right)
+    wanted_left, wanted_right = xp.where(left < 0, -left, 0.5 * left), xp.where(right < 0, -right, 0.5 * right)
+    total = xp.minimum(wanted_left + wanted_right, available)
+    cost_left = total * wanted_left / (wanted_left + wanted_right)
+    return cost_left, total * wanted_right / (cost_left + wanted_right)
+
+
+def dash_cost(power: Value) -> Value:
+    """Return the stamina that a dash takes before version 19 of the server: twice its power backwards."""
+    return _of(power).where(power < 0, -2.0 * power, power)
+
+
 def turn(moment: Value, speed: Value, inertia_moment: Value) -> Value:
     """Return the angle by which a player turns, in the unit of ``moment`` (``player.cpp``, turn).
 
@@ -214,6 +282,24 @@ def tackle_power(
     """
     power = max_back_tackle_power + (max_tackle_power - max_back_tackle_power) * (1.0 - abs(direction) / math.pi)
     return power * tackle_power_rate * (1.0 - 0.5 * off_angle(off_body) / math.pi)
+
+
+def catch_chance(forward: Value, aside: Value, stretch: Value, *, server: Any) -> Value:
+    """Return the probability that a catch succeeds, NaN where it does not reach the ball (``player.cpp``, catch).
+
+    Args:
+        forward, aside: metres to the ball along the direction of the catch and across it.
+        stretch: catchable_area_l_stretch of the goalkeeper's type.
+        server: parameters of the server by name.
+    """
+    xp = _of(forward)
+    spread = server["catchable_area_l"] * (stretch - 1.0)
+    surely, most = server["catchable_area_l"] - spread, server["catchable_area_l"] + spread
+    beyond = (forward - surely) / xp.where(most > surely, most - surely, 1.0)
+    reached = (forward >= 0) & (forward <= most) & (abs(aside) <= 0.5 * server["catchable_area_w"])
+    return xp.where(
+        reached, server["catch_probability"] * xp.clip(1.0 - xp.where(forward > surely, beyond, 0.0), 0, 1), math.nan
+    )
 
 
 def rested(

@@ -693,6 +693,24 @@ _LEG_NUMBERS = _int(2)
 
 
 @_helper
+def _as_read(buffer: Bytes, start: int, stop: int, value: float) -> float:
+    """Return a number as the server reads it: one without a point or exponent is an int of 32 bits, which wraps."""
+    if -2147483648.0 <= value <= 2147483647.0:
+        return value
+    for position in range(start, stop):
+        byte = _byte(buffer, position)
+        if byte == 46 or byte == 69 or byte == 101:
+            return value
+    # What no long holds is cut to the nearest one that does.
+    if value >= 9223372036854775807.0:
+        return -1.0
+    if value <= -9223372036854775808.0:
+        return 0.0
+    low = _int(value) & _int(0xFFFFFFFF)
+    return float(low - _int(0x100000000) if low >= _int(0x80000000) else low)
+
+
+@_helper
 def _plain_numbers(
     buffer: Bytes, position: int, stop: int, row: int, first: int, most: int, args: Any
 ) -> tuple[int, int]:
@@ -716,7 +734,7 @@ def _plain_numbers(
             return -1, position
         if count >= most:
             return -1, position
-        args[first + count, row] = value
+        args[first + count, row] = _as_read(buffer, position, after, value)
         count += 1
         position = after
 

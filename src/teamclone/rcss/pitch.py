@@ -18,3 +18,5 @@ MARGIN = 5.0
 MAX_X = HALF_LENGTH + MARGIN
 """Players are clipped to |x| <= MAX_X, |y| <= MAX_Y at every step."""
 MAX_Y = HALF_WIDTH + MARGIN
+POST_RADIUS = 0.06
+"""Posts stand with their inner edge on the goal's width and their front on the goal line."""

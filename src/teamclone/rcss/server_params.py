@@ -79,6 +79,22 @@ _BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
 OLDEST = 16
 """The version whose defaults are used for all before it. A log without a parameter is most likely that old."""
 
+FURTHER: dict[str, float] = {
+    "foul_cycles": 5.0,
+    "maxneckang": 90.0,
+    "minneckang": -90.0,
+    "maxneckmoment": 180.0,
+    "minneckmoment": -180.0,
+    "slowness_on_top_for_left_team": 1.0,
+    "slowness_on_top_for_right_team": 1.0,
+    "team_actuator_noise": 0.0,
+    "wind_rand": 0.0,
+}
+"""Defaults of parameters that only the step of a cycle needs (`dynamics`): no dataset and no model has them."""
+
+_NEW_IN = (("dist_noise_rate", 19), ("max_catch_angle", 17))
+"""Parameters that the server lists from a version on."""
+
 FIELDS = tuple(DEFAULTS)
 """The order of the parameters wherever they stand in an array, ``World.server``."""
 SERVER_FIELD = {name: index for index, name in enumerate(FIELDS)}
@@ -93,7 +109,15 @@ def default(name: str, *, version: int | None = None) -> float:
     for before, values in _BEFORE:
         if version is not None and version < before and name in values:
             return values[name]
-    return DEFAULTS[name]
+    return DEFAULTS[name] if name in DEFAULTS else FURTHER[name]
+
+
+def version(params: Mapping[str, float | str]) -> int:
+    """Return the version of the server whose rules a match was played by, as far as its parameters show it.
+
+    One of 19, 17 (17 and 18 compute alike) and `OLDEST`.
+    """
+    return next((since for name, since in _NEW_IN if name in params), OLDEST)
 
 
 def number(params: Mapping[str, float | str], name: str, *, version: int | None = None) -> float:

@@ -1,0 +1,67 @@
+"""``Rules``: by which parameters a match was played."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.errors import UsageError
+from teamclone.rcss import player_types
+from teamclone.rcss import server_params as server_of
+
+LEGS_SINCE = 19
+"""The version of rcssserver from which a player dashes with two legs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rules:
+    """The parameters that enter the computations of a cycle.
+
+    Attributes:
+        server: parameters of the server by name, those of `rcss.server_params`.
+        types: parameters of the player types by name, each (n_types,) float64; row = type id.
+        version: the version of rcssserver, see `rcss.server_params.version`.
+        referee: a referee keeps players near the pitch and freezes whom a foul meets. A server for a trainer has none.
+    """
+
+    server: Mapping[str, float]
+    types: Mapping[str, NDArray[np.float64]]
+    version: int
+    referee: bool = True
+
+    @classmethod
+    def of(
+        cls, params: Mapping[str, float | str], types: Mapping[str, NDArray[Any]], *, version: int | None = None
+    ) -> Rules:
+        """Return the rules of a match.
+
+        Args:
+            params: the server's parameters as its log lists them; the defaults of ``version`` where one is missing.
+            types: the columns of ``player_types.FIELDS``, (n_types,).
+            version: of rcssserver; None for what the parameters show.
+
+        Raises:
+            UsageError: the match has rules that are not computed here: wind, or noise by team.
+        """
+        version = server_of.version(params) if version is None else version
+        server = {
+            name: server_of.number(params, name, version=version) for name in (*server_of.DEFAULTS, *server_of.FURTHER)
+        }
+        for name in ("wind_rand", "team_actuator_noise"):
+            if server[name] != 0:
+                raise UsageError(f"expected a match without wind and noise by team, got {name} = {server[name]:g}")
+        return cls(
+            server=server,
+            types={name: np.asarray(types[name], np.float64) for name in player_types.FIELDS},
+            version=version,
+            referee=not params.get("coach") or bool(params.get("coach_w_referee")),
+        )
+
+    @property
+    def legs(self) -> bool:
+        """Whether players dash with two legs, each with a power and a direction of its own."""
+        return self.version >= LEGS_SINCE

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.dynamics.bodies import BALL, Bodies, Commands
-from teamclone.dynamics.logged import logged_bodies, logged_commands
+from teamclone.dynamics.logged import Logged
 from teamclone.dynamics.rules import Rules
 from teamclone.dynamics.step import step
 from teamclone.logs.align import follows
 from teamclone.logs.match import Match
-from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
 
 HALF_STEP = {
@@ -49,16 +48,9 @@ class Transitions:
 
 def transitions(match: Match) -> Transitions:
     """The cycles of play_on in which nothing but the physics acts."""
-    bodies = logged_bodies(match.frames, match.players)
-    commands, succeeded = logged_commands(match)
-    known = follows(match.frames)
-    trainer = match.commands["frame"][(match.commands["side"] == 0) & (match.commands["kind"] != CommandKind.DONE)]
-    known[trainer[trainer >= 0]] = False
-    dashed = np.zeros(commands.kind.shape, np.bool_)
-    dashed[:-1] = np.diff(match.players["count_dash"], axis=0) > 0
-    unknown = dashed & np.isnan(commands.legs[..., 0]).all(axis=-1)
-    unknown |= (commands.kind > CommandKind.DASH) & np.isnan(commands.numbers[..., 0])
-    known &= ~unknown.any(axis=-1) & (bodies.mode == PlayMode.PLAY_ON)
+    logged = Logged.of(match)
+    bodies, commands, succeeded = logged.bodies, logged.commands, logged.succeeded
+    known = follows(match.frames) & ~logged.trainer & ~logged.unknown.any(axis=-1) & (bodies.mode == PlayMode.PLAY_ON)
     rows = np.flatnonzero(known)
     after = bodies.select(rows + 1)
     rows = rows[after.mode == PlayMode.PLAY_ON]

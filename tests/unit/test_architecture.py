@@ -27,7 +27,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "dynamics": ("errors", "rcss", "logs.columns", "logs.match", "logs.align"),
     "protocol": (*BASE, "logs"),
     "world": ("rcss", "dynamics", "logs.columns", "logs.match", "logs.align"),
-    "store": (*BASE, "logs"),
+    "store": (*BASE, "logs", "dynamics"),
     "dataset": (*READING, "dynamics"),
     "play": (*BASE, "logs", "protocol", "store"),
     "planner": ("system", "rcss", "dynamics", "world.channels"),

@@ -16,6 +16,9 @@ def validate(
     store: Annotated[
         str | None, typer.Option(help="Check this store: a folder or postgresql://USER:PASSWORD@HOST/DATABASE.")
     ] = None,
+    physics: Annotated[
+        bool, typer.Option("--physics", help="Compare every cycle of play with what the server's rules make of it.")
+    ] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a match, each on a line.")] = False,
 ) -> None:
@@ -42,8 +45,11 @@ def validate(
             bar.update(task, completed=done, total=total)
 
         for checked in chain(
-            validate_logs(logs, jobs=jobs, on_progress=on_progress) if logs else (),
-            *(validate_store(open_store(place), jobs=jobs, on_progress=on_progress) for place in stores),
+            validate_logs(logs, physics=physics, jobs=jobs, on_progress=on_progress) if logs else (),
+            *(
+                validate_store(open_store(place), physics=physics, jobs=jobs, on_progress=on_progress)
+                for place in stores
+            ),
         ):
             print(json.dumps(as_object(checked), ensure_ascii=False) if as_json else line(checked))
             total += 1
@@ -60,11 +66,22 @@ def line(checked: MatchCheck) -> str:
     ``ok     match.rcg.gz: 5999 frames, 700123 commands`` or ``wrong  ...`` with the first problem.
     """
     if not checked.wrong:
-        return f"ok     {checked.name}: {checked.frames} frames, {checked.commands} commands"
+        return f"ok     {checked.name}: {checked.frames} frames, {checked.commands} commands" + physics_line(checked)
     first, *more = checked.wrong
     first = " ".join(first.split())
     name = "" if checked.name in first else f"{checked.name}: "
     return f"wrong  {name}{first}" + (f" ({len(more)} more; --json lists all)" if more else "")
+
+
+def physics_line(checked: MatchCheck) -> str:
+    """Return what a line says of the physics: empty where it was not asked for."""
+    physics = checked.physics
+    if physics is None:
+        return ""
+    if physics.left_out is not None:
+        return f"; physics not checked: {physics.left_out}"
+    missing = f", {physics.unknown} commands without a log" if physics.unknown else ""
+    return f"; physics of {physics.cycles} cycles{missing}"
 
 
 def as_object(checked: MatchCheck) -> dict[str, Any]:
@@ -79,6 +96,14 @@ def as_object(checked: MatchCheck) -> dict[str, Any]:
         "commands": checked.commands,
         "error": checked.error,
         "problems": [problem_json(problem) for problem in checked.problems],
+        "physics": None
+        if checked.physics is None
+        else {
+            "cycles": checked.physics.cycles,
+            "compared": dict(checked.physics.compared),
+            "unknown_commands": checked.physics.unknown,
+            "left_out": checked.physics.left_out,
+        },
         "findings": [
             {
                 "check": finding.check.name,

@@ -198,6 +198,17 @@ def fastest(
     return xp.where(meets, xp.clip(middle + half, 0.0, ball_speed_max), 0.0)
 
 
+def dash_angle(direction_deg: Value, *, server: Any) -> Value:
+    """Return the direction of a dash in degrees as the server takes it: within its limits and in steps (``leg.cpp``).
+
+    Args:
+        server: parameters of the server by name.
+    """
+    xp, step = _of(direction_deg), server["dash_angle_step"]
+    limited_deg = xp.clip(direction_deg, server["min_dash_angle"], server["max_dash_angle"])
+    return xp.round(limited_deg / step) * step if step > 0 else limited_deg
+
+
 def dash_rate(direction_deg: Value, *, side_dash_rate: Value, back_dash_rate: Value) -> Value:
     """Return the share of a dash's power that a direction leaves (``player.cpp``, dash).
 

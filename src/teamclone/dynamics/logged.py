@@ -1,6 +1,9 @@
-"""From the columns of a match to `Bodies` and `Commands`: what a log knows of each cycle and of what was done in it."""
+"""``Logged``: the columns of a match as `Bodies` and `Commands`."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +16,16 @@ from teamclone.rcss import state_bits
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS
 
-_FROZEN = state_bits.TACKLE | state_bits.TACKLE_FAULT
+_TACKLES = state_bits.TACKLE | state_bits.TACKLE_FAULT
 _CATCHES = state_bits.CATCH | state_bits.CATCH_FAULT
+_MEANT = ("on", "true")
+"""Words of a tackle that means a foul."""
 _TAKING_LEGS = (CommandKind.TURN, CommandKind.MOVE, CommandKind.TACKLE, CommandKind.DASH)
 """Commands that take both legs (`player.cpp`, `leg.cpp`)."""
 _COLLIDED = state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE
 
 
-def logged_bodies(frames: Columns, players: Columns) -> Bodies:
+def _bodies(frames: Columns, players: Columns) -> Bodies:
     """Return ball and players of all frames of a match.
 
     Cycles of being frozen are counted ahead: up to the last frame of the bits of a tackle or foul.
@@ -46,7 +51,7 @@ def logged_bodies(frames: Columns, players: Columns) -> Bodies:
         on_field=(state & state_bits.STAND) != 0,
         goalie=(state & state_bits.GOALIE) != 0,
         frozen=np.maximum(
-            _left(frames, (state & _FROZEN) != 0, again=_rose(players, CommandKind.TACKLE)),
+            _left(frames, (state & _TACKLES) != 0, again=_rose(players, CommandKind.TACKLE)),
             _left(frames, (state & state_bits.FOUL_CHARGED) != 0),
         ),
         banned=np.zeros(state.shape, np.int64),
@@ -70,43 +75,83 @@ def _left(frames: Columns, bit: NDArray[np.bool_], *, again: NDArray[np.bool_] |
     return left
 
 
-def logged_commands(match: Match) -> tuple[Commands, NDArray[np.bool_]]:
-    """Return the commands of a match that the server executed, and which tackles and catches succeeded.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Logged:
+    """What the logs of a match know of each cycle and of what was done in it.
 
-    The counters of the next frame say which were executed, the command log says with which numbers. A frame without a
-    direct successor has none.
-
-    Returns:
-        commands of n_frames cycles; (n_frames, 22) bool, success.
+    Attributes:
+        frames, players: the columns of the game log, (n_frames,) and (n_frames, 22).
+        bodies: of all frames. commands: those that the server executed on each; none on a frame without a direct
+            successor. The counters of the next frame say which, the command log with which numbers; NaN if it does not.
+        succeeded: (n_frames, 22) bool, which tackles and catches succeeded.
+        trainer: (n_frames,) bool, where a trainer acted.
     """
-    frames, players, log = match.frames, match.players, match.commands
-    kind = executed_kind(frames, players)
-    dashed = _rose(players, CommandKind.DASH) & follows(frames)[:, None]
-    numbers = np.full((*kind.shape, 2), np.nan)
-    legs = np.full((*kind.shape, 2, 2), np.nan)
-    foul = np.zeros(kind.shape, np.bool_)
-    bodies = logged_bodies(frames, players)
-    first = first_body_commands(log, frames["playmode"])
-    # A frozen player's commands are ignored, but for legs that dash.
-    free = bodies.frozen[log["frame"][first], slot_of(log["side"][first], log["unum"][first])] == 0
-    first = first[free]
-    at = log["frame"][first], slot_of(log["side"][first], log["unum"][first])
-    taken = kind[at] == log["kind"][first]
-    first, at = first[taken], (at[0][taken], at[1][taken])
-    numbers[at] = np.stack([log["arg0"][first], log["arg1"][first]], axis=-1)
-    tackles = log["kind"][first] == CommandKind.TACKLE
-    foul[at[0][tackles], at[1][tackles]] = [match.command_text(index) in ("on", "true") for index in first[tackles]]
-    plain = (log["kind"][first] == CommandKind.DASH) & (log["legs"][first] == 0)
-    legs[at[0][plain], at[1][plain]] = numbers[at[0][plain], at[1][plain]][:, None, :]
-    _put_legs(legs, log, dashed, first)
-    state = np.zeros_like(players["state"])
-    state[:-1] = players["state"][1:]
-    succeeded = (kind == CommandKind.TACKLE) & ((state & _FROZEN) == state_bits.TACKLE)
-    succeeded |= (kind == CommandKind.CATCH) & ((state & _CATCHES) == state_bits.CATCH)
-    return (
-        Commands(kind=kind, numbers=numbers, legs=legs, foul=foul, turn_neck=_necks(match)),
-        succeeded,
-    )
+
+    frames: Columns
+    players: Columns
+    bodies: Bodies
+    commands: Commands
+    succeeded: NDArray[np.bool_]
+    trainer: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, match: Match) -> Logged:
+        """Return what the logs of a match know; without a command log no numbers of commands are known."""
+        return cls.of_columns(match.frames, match.players, match.commands, match.command_text)
+
+    @classmethod
+    def of_columns(cls, frames: Columns, players: Columns, log: Columns, text: Callable[[int], str]) -> Logged:
+        """Return what the columns of a match know.
+
+        Args:
+            frames, players, log: ``columns.FRAMES``, ``PLAYERS`` and ``COMMANDS``.
+            text: gives the text of a command by its index; asked for tackles alone.
+        """
+        bodies = _bodies(frames, players)
+        kind = executed_kind(frames, players)
+        first = first_body_commands(log, frames["playmode"])
+        # A frozen player's commands are ignored, but for legs that dash.
+        first = first[bodies.frozen[_place(log, first)] == 0]
+        numbers = np.full((*kind.shape, 2), np.nan)
+        taken = first[kind[_place(log, first)] == log["kind"][first]]
+        numbers[_place(log, taken)] = np.stack([log["arg0"][taken], log["arg1"][taken]], axis=-1)
+        tackles = taken[log["kind"][taken] == CommandKind.TACKLE]
+        foul = np.zeros(kind.shape, np.bool_)
+        foul[_place(log, tackles)] = [text(int(index)) in _MEANT for index in tackles]
+        state = np.zeros_like(players["state"])
+        state[:-1] = players["state"][1:]
+        succeeded = (kind == CommandKind.TACKLE) & ((state & _TACKLES) == state_bits.TACKLE)
+        succeeded |= (kind == CommandKind.CATCH) & ((state & _CATCHES) == state_bits.CATCH)
+        trainer = np.zeros(len(kind), np.bool_)
+        acts = (log["side"] == 0) & (log["kind"] != CommandKind.DONE) & (log["frame"] >= 0)
+        trainer[log["frame"][acts]] = True
+        return cls(
+            frames=frames,
+            players=players,
+            bodies=bodies,
+            commands=Commands(
+                kind=kind,
+                numbers=numbers,
+                legs=_legs(frames, players, log, first),
+                foul=foul,
+                turn_neck=_necks(frames, players, log),
+            ),
+            succeeded=succeeded,
+            trainer=trainer,
+        )
+
+    @property
+    def unknown(self) -> NDArray[np.bool_]:
+        """(n_frames, 22) where a body command was executed whose numbers no log knows."""
+        dashed = _rose(self.players, CommandKind.DASH) & follows(self.frames)[:, None]
+        unknown: NDArray[np.bool_] = dashed & np.isnan(self.commands.legs[..., 0]).all(axis=-1)
+        unknown |= (self.commands.kind > CommandKind.DASH) & np.isnan(self.commands.numbers[..., 0])
+        return unknown
+
+
+def _place(log: Columns, index: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return frame and slot of some commands."""
+    return log["frame"][index].astype(np.int64), slot_of(log["side"][index], log["unum"][index])
 
 
 def _rose(players: Columns, kind: CommandKind) -> NDArray[np.bool_]:
@@ -117,38 +162,39 @@ def _rose(players: Columns, kind: CommandKind) -> NDArray[np.bool_]:
     return rose
 
 
-def _put_legs(legs: NDArray[np.float64], log: Columns, dashed: NDArray[np.bool_], accepted: NDArray[np.int64]) -> None:
-    """Write two-leg dashes into ``legs`` (n_frames, 22, 2, 2): the first of each leg, where the player dashed.
+def _legs(frames: Columns, players: Columns, log: Columns, accepted: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return (n_frames, 22, 2, 2) power and direction of both legs where the player dashed.
 
-    A plain dash, a turn, a move or a tackle before it takes both legs, where it is among the ``accepted`` commands.
+    Of several two-leg dashes the first of each leg counts. A plain dash, a turn, a move or a tackle takes both legs,
+    if it is among the ``accepted`` commands.
     """
-    with_legs = log["valid"] & (log["legs"] > 0) & (log["frame"] >= 0) & (log["unum"] > 0)
+    legs = np.full((*players["state"].shape, 2, 2), np.nan)
+    dashed = _rose(players, CommandKind.DASH) & follows(frames)[:, None]
+    plain = accepted[(log["kind"][accepted] == CommandKind.DASH) & (log["legs"][accepted] == 0)]
+    plain = plain[dashed[_place(log, plain)]]
+    legs[_place(log, plain)] = np.stack([log["arg0"][plain], log["arg1"][plain]], axis=-1)[:, None, :]
+    of_player = (log["frame"] >= 0) & (log["unum"] > 0) & log["valid"]
+    with_legs = of_player & (log["legs"] > 0)
     if not with_legs.any():
-        return
-    is_accepted = np.zeros(len(with_legs), np.bool_)
-    is_accepted[accepted] = True
-    slots = slot_of(log["side"], log["unum"])
-    keys = log["frame"].astype(np.int64) * N_PLAYERS + slots
-    busy = log["valid"] & (np.isin(log["kind"], _TAKING_LEGS) | with_legs) & np.isin(keys, keys[with_legs])
-    free: dict[int, int] = {}
-    for index in np.flatnonzero(busy):
-        frame, slot = log["frame"][index], slots[index]
-        if not dashed[frame, slot] or not (with_legs[index] or is_accepted[index]):
-            continue
-        left = free.setdefault(keys[index], 3)
-        taken = int(log["legs"][index]) or 3
+        return legs
+    taking = with_legs.copy()
+    taking[accepted] |= np.isin(log["kind"][accepted], _TAKING_LEGS)
+    free: dict[tuple[int, int], int] = {}
+    for index in np.flatnonzero(taking):
+        frame, slot = (int(part[0]) for part in _place(log, np.array([index])))
+        left, taken = free.get((frame, slot), 3), int(log["legs"][index]) or 3
         for leg in (0, 1):
-            if left & taken & (1 << leg) and log["legs"][index]:
+            if with_legs[index] and left & taken & (1 << leg) and dashed[frame, slot]:
                 legs[frame, slot, leg] = log[f"arg{2 * leg}"][index], log[f"arg{2 * leg + 1}"][index]
-        free[keys[index]] = left & ~taken
+        free[frame, slot] = left & ~taken
+    return legs
 
 
-def _necks(match: Match) -> NDArray[np.float64]:
-    """Return (n_frames, 22) the moments of executed turns of the neck, the first of each cycle; 0 none."""
-    log = match.commands
-    moments = np.zeros(match.players["state"].shape)
+def _necks(frames: Columns, players: Columns, log: Columns) -> NDArray[np.float64]:
+    """Return (n_frames, 22) the moments of executed turns of the neck, the first of each cycle; 0 none, NaN unknown."""
+    moments = np.full(players["state"].shape, np.nan)
     index = np.flatnonzero(
         (log["kind"] == CommandKind.TURN_NECK) & log["valid"] & (log["frame"] >= 0) & (log["unum"] > 0)
     )[::-1]  # of several the last written stays: the first in the log
-    moments[log["frame"][index], slot_of(log["side"][index], log["unum"][index])] = log["arg0"][index]
-    return np.where(_rose(match.players, CommandKind.TURN_NECK) & follows(match.frames)[:, None], moments, 0.0)
+    moments[_place(log, index)] = log["arg0"][index]
+    return np.where(_rose(players, CommandKind.TURN_NECK) & follows(frames)[:, None], moments, 0.0)

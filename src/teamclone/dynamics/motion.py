@@ -132,7 +132,7 @@ def _dashes(
     at = np.nonzero(has_leg.any(axis=-1) & bodies.on_field)
     server, legs = rules.server, commands.legs[at]
     power = np.clip(np.nan_to_num(legs[..., 0]), server["min_dash_power"], server["max_dash_power"])
-    angle = _dash_angle(np.nan_to_num(legs[..., 1]), rules)
+    angle = formulas.dash_angle(np.nan_to_num(legs[..., 1]), server=server)
     rate = formulas.dash_rate(
         np.abs(angle), side_dash_rate=server["side_dash_rate"], back_dash_rate=server["back_dash_rate"]
     )
@@ -155,13 +155,6 @@ def _dashes(
     ay[at] = forward * np.sin(body) + aside * np.cos(body)
     stamina[at] = np.maximum(bodies.stamina[at] - cost, 0.0)
     return ax, ay, rotation, stamina
-
-
-def _dash_angle(angle: NDArray[np.float64], rules: Rules) -> NDArray[np.float64]:
-    """Return directions of dashes in degrees, as the server takes them: in steps."""
-    angle = np.clip(angle, rules.server["min_dash_angle"], rules.server["max_dash_angle"])
-    step = rules.server["dash_angle_step"]
-    return np.rint(angle / step) * step if step > 0 else angle
 
 
 def _by_legs(

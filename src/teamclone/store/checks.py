@@ -27,6 +27,12 @@ class Check:
 
     name: str
     about: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Query(Check):
+    """A rule as a query that gives the rows which break it."""
+
     sql: str
 
 
@@ -81,51 +87,51 @@ _NUMBERS = {
 }
 
 CHECKS = (
-    Check(
+    Query(
         name="frame-numbers",
         about="frames are numbered 0, 1, 2, ...",
         sql="select cycle, concat('frame ', frame) as what from frames "
         "qualify frame <> row_number() over (order by frame) - 1 order by frame",
     ),
-    Check(
+    Query(
         name="time-order",
         about="(cycle, stoppage) grows from frame to frame",
         sql="select cycle, concat('stoppage ', stoppage, ' at frame ', frame) as what from frames "
         "qualify (cycle, stoppage) <= lag((cycle, stoppage)) over (order by frame) order by frame",
     ),
-    Check(
+    Query(
         name="playmode",
         about="every play mode is one of the server's",
         sql="select cycle, concat('play mode ', playmode) as what from frames "
         "where playmode not in (select id from playmodes where id > 0) order by frame",
     ),
-    Check(
+    Query(
         name="score",
         about="no score falls",
         sql="select cycle, concat(left_score, ' : ', right_score) as what from frames "
         "window clock as (order by frame) "
         "qualify left_score < lag(left_score) over clock or right_score < lag(right_score) over clock order by frame",
     ),
-    Check(
+    Query(
         name="final-score",
         about="the match has the score of its last frame",
         sql="select f.cycle, concat('match ', m.left_score, ' : ', m.right_score, ', frame ', f.left_score, ' : ', "
         "f.right_score) as what from matches m join frames f using (match_id) where f.frame = m.n_frames - 1 "
         "and (f.left_score, f.right_score) <> (m.left_score, m.right_score)",
     ),
-    Check(
+    Query(
         name="ball-position",
         about="the ball is somewhere near the pitch",
         sql="select cycle, concat('ball at ', ball_x, ', ', ball_y) as what from frames where "
         f"not coalesce(abs(ball_x) <= {pitch.LENGTH} and abs(ball_y) <= {pitch.WIDTH}, false) order by frame",
     ),
-    Check(
+    Query(
         name="ball-speed",
         about="the ball is no faster than ball_speed_max",
         sql="select cycle, concat('ball velocity ', ball_vx, ', ', ball_vy) as what from frames where "
         f"sqrt(ball_vx ** 2 + ball_vy ** 2) > {_parameter('ball_speed_max')} + {_SLACK} order by frame",
     ),
-    Check(
+    Query(
         name="players-per-frame",
         about=f"every frame has players 1 to {N_TEAM} of both sides",
         sql="select f.cycle, concat(count(p.frame), ' players in frame ', f.frame) as what "
@@ -135,7 +141,7 @@ CHECKS = (
         f"having count(p.frame) <> {N_PLAYERS} or count(distinct p.side * p.unum) <> {N_PLAYERS} "
         "order by f.frame",
     ),
-    Check(
+    Query(
         name="player-position",
         about=f"players on the field are within {pitch.MAX_X} m and {pitch.MAX_Y} m of the centre",
         sql=_states(
@@ -143,31 +149,31 @@ CHECKS = (
             "'position ', x, ', ', y",
         ),
     ),
-    Check(
+    Query(
         name="player-speed",
         about="no player is faster than its type allows",
         sql=f"select cycle, concat({_PLAYER}, ' has velocity ', vx, ', ', vy) as what from player_states "
         "join frames using (match_id, frame) join player_types using (match_id, type) "
         f"where {_ON_FIELD} and sqrt(vx ** 2 + vy ** 2) > player_speed_max + {_SLACK} order by frame",
     ),
-    Check(
+    Query(
         name="body",
         about="body directions are within ±180 degrees",
         sql=_states("not coalesce(abs(body) <= 180.01, false)", "'body ', body"),
     ),
-    Check(
+    Query(
         name="neck",
         about="neck directions are within minneckang and maxneckang",
         sql=_states(
             f"neck < {_parameter('minneckang')} - 0.01 or neck > {_parameter('maxneckang')} + 0.01", "'neck ', neck"
         ),
     ),
-    Check(
+    Query(
         name="stamina",
         about="stamina is within 0 and stamina_max",
         sql=_states(f"stamina < 0 or stamina > {_parameter('stamina_max')} + {_SLACK}", "'stamina ', stamina"),
     ),
-    Check(
+    Query(
         name="capacity",
         about="stamina capacity is at most stamina_capacity",
         sql=_states(
@@ -175,54 +181,54 @@ CHECKS = (
             "'capacity ', capacity",
         ),
     ),
-    Check(
+    Query(
         name="effort",
         about="effort and recovery are within 0 and 1",
         sql=_states(
             "effort not between 0 and 1 or recovery not between 0 and 1", "'effort ', effort, ', recovery ', recovery"
         ),
     ),
-    Check(
+    Query(
         name="player-type",
         about="every player's type is listed by the log",
         sql=_states(
             "exists (from player_types) and type not in (select type from player_types)", "'type ', player_states.type"
         ),
     ),
-    Check(
+    Query(
         name="counters",
         about="counts of executed commands never fall",
         sql=f"select cycle, concat({_PLAYER}, ' counts fewer commands than a frame before') as what "
         f"from player_states join frames using (match_id, frame) "
         f"window player as (partition by side, unum order by frame) qualify {_FALLING} order by frame",
     ),
-    Check(
+    Query(
         name="command-order",
         about="commands and their lines are in the order of time",
         sql="select cycle, concat('line ', line) as what from (select *, row_number() over () as place from commands) "
         "window log as (order by place) "
         "qualify cycle < lag(cycle) over log or line < lag(line) over log order by place",
     ),
-    Check(
+    Query(
         name="command-sender",
         about="commands come from a side's players or coach, or from the trainer",
         sql=_commands(
             f"side not in (1, 0, -1) or unum not between 0 and {N_TEAM} or (side = 0 and unum <> 0)", "'sent a command'"
         ),
     ),
-    Check(
+    Query(
         name="command-kind",
         about="every command kind is known",
         sql=_commands("kind not in (select id from command_kinds)", "'has kind ', kind"),
     ),
-    Check(
+    Query(
         name="command-frame",
         about="a command's frame is of the command's cycle",
         sql="select c.cycle, concat('line ', c.line, ': frame ', c.frame) as what from commands c "
         "left join frames f on f.frame = c.frame "
         "where c.frame <> -1 and f.cycle is distinct from c.cycle order by c.line",
     ),
-    Check(
+    Query(
         name="command-numbers",
         about="commands that the server takes have their numbers",
         sql=_commands(

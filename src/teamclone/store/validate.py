@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from teamclone.errors import LogError, StoreError
 from teamclone.logs import LogPair, Problem, Severity, find_matches, read_pair
 from teamclone.store import convert, schema
 from teamclone.store.checks import Finding, check_match
 from teamclone.store.opening import open_store
+from teamclone.store.physics import Physics, check_physics
 from teamclone.store.store import Store
 from teamclone.system.workers import Died, run_tasks
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 T = TypeVar("T", LogPair, tuple[str, str])
 
@@ -30,6 +35,7 @@ class MatchCheck:
         error: why nothing could be read, else None.
         problems: problems of its files; none for a stored match, whose are in its table ``problems``.
         findings: the rules that its rows break.
+        physics: what was compared with the server's physics; None if that was not asked for.
     """
 
     name: str
@@ -39,6 +45,7 @@ class MatchCheck:
     error: str | None = None
     problems: tuple[Problem, ...] = ()
     findings: tuple[Finding, ...] = ()
+    physics: Physics | None = None
 
     @property
     def wrong(self) -> list[str]:
@@ -49,22 +56,29 @@ class MatchCheck:
 
 
 def validate_logs(
-    paths: Iterable[Path], *, jobs: int | None = None, on_progress: OnProgress | None = None
+    paths: Iterable[Path], *, physics: bool = False, jobs: int | None = None, on_progress: OnProgress | None = None
 ) -> Iterator[MatchCheck]:
     """Check every match in these files and folders, in the order of their paths. Writes nothing.
+
+    Args:
+        physics: compare every cycle of play with what the server makes of the one before, too.
 
     Raises:
         UsageError: a path does not exist, or there is no log under any of them.
     """
-    yield from _in_order(_validate_pair, find_matches(paths), jobs=jobs, on_progress=on_progress)
+    tasks = find_matches(paths)
+    yield from _in_order(partial(_validate_pair, physics=physics), tasks, jobs=jobs, on_progress=on_progress)
 
 
 def validate_store(
-    store: Store, *, jobs: int | None = None, on_progress: OnProgress | None = None
+    store: Store, *, physics: bool = False, jobs: int | None = None, on_progress: OnProgress | None = None
 ) -> Iterator[MatchCheck]:
-    """Check every match of a store: its tables can be read, have the rows they should, and break no rule."""
+    """Check every match of a store: its tables can be read, have the rows they should, and break no rule.
+
+    ``physics`` as in `validate_logs`.
+    """
     tasks = [(store.location, match_id) for match_id in store.match_ids()]
-    yield from _in_order(_validate_stored, tasks, jobs=jobs, on_progress=on_progress)
+    yield from _in_order(partial(_validate_stored, physics=physics), tasks, jobs=jobs, on_progress=on_progress)
 
 
 def _in_order(
@@ -82,24 +96,35 @@ def _dead(task: LogPair | tuple[str, str]) -> MatchCheck:
     return MatchCheck(name=name, error=f"{name}: the process that checked it was killed, perhaps out of memory")
 
 
-def _validate_pair(pair: LogPair) -> MatchCheck:
+def _validate_pair(pair: LogPair, *, physics: bool) -> MatchCheck:
     try:
         match = read_pair(pair)
     except LogError as error:
         return MatchCheck(name=str(pair.path), error=str(error))
     except OSError as error:
         return MatchCheck(name=str(pair.path), error=f"{pair.path}: {error.strerror or error}")
+    compared, findings = _check(convert.tables_of(match), physics=physics)
     return MatchCheck(
         name=str(pair.path),
         match_id=match.match_id,
         frames=len(match.frames["cycle"]),
         commands=len(match.commands["cycle"]),
         problems=match.problems,
-        findings=tuple(check_match(convert.tables_of(match))),
+        findings=findings,
+        physics=compared,
     )
 
 
-def _validate_stored(task: tuple[str, str]) -> MatchCheck:
+def _check(tables: Mapping[str, pa.Table], *, physics: bool) -> tuple[Physics | None, tuple[Finding, ...]]:
+    """Return what the physics was compared with, if asked for, and all findings."""
+    findings = check_match(tables)
+    if not physics:
+        return None, tuple(findings)
+    compared, more = check_physics(tables)
+    return compared, (*findings, *more)
+
+
+def _validate_stored(task: tuple[str, str], *, physics: bool) -> MatchCheck:
     location, match_id = task
     store = open_store(location)
     try:
@@ -119,10 +144,12 @@ def _validate_stored(task: tuple[str, str]) -> MatchCheck:
                 error=f"{match_id}: expected {about[0][f'n_{name}']} rows in {name}, got {tables[name].num_rows}; "
                 "remove the match and ingest it again",
             )
+    compared, findings = _check(tables, physics=physics)
     return MatchCheck(
         name=match_id,
         match_id=match_id,
         frames=about[0]["n_frames"],
         commands=about[0]["n_commands"],
-        findings=tuple(check_match(tables)),
+        findings=findings,
+        physics=compared,
     )

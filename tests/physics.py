@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from teamclone.dynamics.bodies import BALL, Bodies, Commands
 from teamclone.dynamics.logged import Logged
+from teamclone.dynamics.residuals import residuals
 from teamclone.dynamics.rules import Rules
 from teamclone.dynamics.step import step
-from teamclone.logs.align import follows
 from teamclone.logs.match import Match
-from teamclone.rcss.playmodes import PlayMode
 
 HALF_STEP = {
     "x": 5e-5,
@@ -49,20 +48,18 @@ class Transitions:
 def transitions(match: Match) -> Transitions:
     """The cycles of play_on in which nothing but the physics acts."""
     logged = Logged.of(match)
-    bodies, commands, succeeded = logged.bodies, logged.commands, logged.succeeded
-    known = follows(match.frames) & ~logged.trainer & ~logged.unknown.any(axis=-1) & (bodies.mode == PlayMode.PLAY_ON)
-    rows = np.flatnonzero(known)
-    after = bodies.select(rows + 1)
-    rows = rows[after.mode == PlayMode.PLAY_ON]
-    before, after = bodies.select(rows), bodies.select(rows + 1)
+    rules = Rules.of(match.game.server_params, match.game.player_types)
+    rows = residuals(logged, rules).frame
+    rows = rows[~logged.unknown[rows].any(axis=-1)]
+    before, after = logged.bodies.select(rows), logged.bodies.select(rows + 1)
     same = ((before.on_field == after.on_field) & (before.type == after.type)).all(axis=-1)
     rows = rows[same]
     return Transitions(
         before=before.select(same),
-        commands=commands.select(rows),
-        succeeded=succeeded[rows],
+        commands=logged.commands.select(rows),
+        succeeded=logged.succeeded[rows],
         after=after.select(same),
-        rules=Rules.of(match.game.server_params, match.game.player_types),
+        rules=rules,
         cycle=match.frames["cycle"][rows],
     )
 

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from teamclone.api import LoadedClone, load
     from teamclone.dataset.build import DatasetConfig, build_dataset
     from teamclone.dataset.reader import Dataset, open_dataset
+    from teamclone.dynamics.bodies import Bodies, Commands
+    from teamclone.dynamics.logged import Logged
+    from teamclone.dynamics.rules import Rules
+    from teamclone.dynamics.step import step
     from teamclone.errors import TeamcloneError
     from teamclone.evaluation.evaluate import evaluate
     from teamclone.evaluation.prediction_table import PredictionTable
@@ -32,6 +36,11 @@ _HOME = {
     "read_match": "logs",
     "find_matches": "logs",
     "Match": "logs",
+    "Rules": "dynamics.rules",
+    "Bodies": "dynamics.bodies",
+    "Commands": "dynamics.bodies",
+    "Logged": "dynamics.logged",
+    "step": "dynamics.step",
     "create_store": "store.opening",
     "open_store": "store.opening",
     "ingest": "store.ingest",
@@ -55,11 +64,15 @@ _HOME = {
 """The module of each public name, in the order of the pipeline."""
 
 __all__ = [
+    "Bodies",
+    "Commands",
     "Dataset",
     "DatasetConfig",
     "LoadedClone",
+    "Logged",
     "Match",
     "PredictionTable",
+    "Rules",
     "Run",
     "TeamcloneError",
     "World",
@@ -75,6 +88,7 @@ __all__ = [
     "open_run",
     "open_store",
     "read_match",
+    "step",
     "train",
     "view",
 ]

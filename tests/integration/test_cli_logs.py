@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import json
 import shutil
@@ -209,6 +210,29 @@ def test_validate(ingested: tuple[Path, dict[str, Any]], fixtures_dir: Path) -> 
     # The league's converter to version 3 writes the ball's vx into vy: impossible speeds, which a rule finds.
     assert [finding["check"] for finding in verdicts["3.rcg.gz"]["findings"]] == ["ball-speed"]
     assert "nothing to validate" in one_line(run("validate", code=2))
+
+
+def test_validate_physics(ingested: tuple[Path, dict[str, Any]], fixtures_dir: Path, tmp_path: Path) -> None:
+    store, _ = ingested
+    [log] = (fixtures_dir / "v6").glob("*.rcg.gz")
+    done = run("validate", "--physics", "--store", store, log, "--jobs", 1)
+    of_log, *of_store, _ = done.stdout.splitlines()
+    assert "; physics of 149 cycles" in of_log
+    assert len(of_store) == 4
+    assert all("; physics " in line for line in of_store)
+    old = run("validate", "--physics", fixtures_dir / "native-v3", "--jobs", 1)
+    assert "physics not checked: expected a log that lists the server's parameters, got one without" in old.stdout
+    edited = tmp_path / "edited.rcg"
+    edited.write_bytes(gzip.decompress(log.read_bytes()).replace(b"(ball_decay 0.94)", b"(ball_decay 0.95)"))
+    shutil.copy(log.with_name(log.name.replace(".rcg", ".rcl")), tmp_path / "edited.rcl.gz")
+    assert run("validate", edited, "--jobs", 1).stdout.startswith("ok")
+    done = run("validate", "--physics", "--json", edited, "--jobs", 1, code=1)
+    [checked] = [json.loads(line) for line in done.stdout.splitlines()]
+    assert checked["physics"]["cycles"] == 149
+    assert checked["physics"]["left_out"] is None
+    finding = checked["findings"][0]
+    assert finding["check"] == "physics-position"
+    assert "ball_decay is 0.94, not 0.95 as the header says" in finding["what"]
 
 
 def test_validate_finds_a_damaged_store(ingested: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation"),
     "api": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline"),
     "cli": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline", "api"),
-    PACKAGE: (*READING, "dataset", "training", "evaluation", "api"),
+    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "api"),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""

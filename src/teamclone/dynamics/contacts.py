@@ -18,7 +18,7 @@ _TINY = 1e-10
 _FIRST, _SECOND = (indices.astype(np.intp) for indices in np.triu_indices(N_BODIES, 1))
 """All pairs of bodies; the ball is always the second."""
 
-_AT_ONCE = 1024
+_AT_ONCE = 256
 """Cycles whose pairs are looked at in one go: few enough to stay in the processor's cache."""
 
 
@@ -33,14 +33,18 @@ def overlapping(
     Returns:
         (m,) the cycle of each, and the place of its pair in all pairs of bodies.
     """
+    widest = 2.0 * max(radius.max(initial=0.0), 0.0)
     cycles, pairs = [], []
-    for start in range(0, len(x), _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
-        dx, dy = (values[part][:, _FIRST] - values[part][:, _SECOND] for values in (x, y))
-        reach = radius[part][:, _FIRST] + radius[part][:, _SECOND]
-        cycle, pair = np.nonzero((dx * dx + dy * dy < reach * reach) & (reach > 0))
-        cycles.append(cycle + start)
-        pairs.append(pair)
+    for start in range(0, max(len(x), 1), _AT_ONCE):
+        across = np.ascontiguousarray(x[start : start + _AT_ONCE].T)
+        # Hardly any pair is near in x alone, so all else is computed of few.
+        pair, cycle = np.nonzero(np.abs(across[_FIRST] - across[_SECOND]) < widest)
+        cycle += start
+        one, other = (cycle, _FIRST[pair]), (cycle, _SECOND[pair])
+        dx, dy, reach = x[one] - x[other], y[one] - y[other], radius[one] + radius[other]
+        overlap = (reach > 0) & (dx * dx + dy * dy < reach * reach)
+        cycles.append(cycle[overlap])
+        pairs.append(pair[overlap])
     return np.concatenate(cycles), np.concatenate(pairs)
 
 

@@ -136,14 +136,14 @@ def _dashes(
     rate = formulas.dash_rate(
         np.abs(angle), side_dash_rate=server["side_dash_rate"], back_dash_rate=server["back_dash_rate"]
     )
-    of_type = {name: values[bodies.type[at]] for name, values in rules.types.items()}
-    per_power = bodies.effort[at] * of_type["dash_power_rate"] / slowness(bodies, rules)[at]
-    available = bodies.stamina[at] + of_type["extra_stamina"]
+    types, of = rules.types, bodies.type[at]
+    per_power = bodies.effort[at] * types["dash_power_rate"][of] / slowness(bodies, rules)[at]
+    available = bodies.stamina[at] + types["extra_stamina"][of]
     if rules.legs:
         used, cost = _by_legs(power, available, rules)
         dashed = per_power[:, None] * used * rate
         ahead = dashed * np.cos(np.radians(angle))
-        turned = (ahead[:, 0] - ahead[:, 1]) / (2.0 * of_type["player_size"])
+        turned = (ahead[:, 0] - ahead[:, 1]) / (2.0 * types["player_size"][of])
         rotation[at] = np.where(has_leg[at][:, 0], turned, 0.0)
         forward, aside = ahead.mean(axis=-1), (dashed * np.sin(np.radians(angle))).mean(axis=-1)
     else:

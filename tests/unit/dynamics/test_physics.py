@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.physics import outside, told, transitions
 
+from physics import outside, told, transitions
 from teamclone.dynamics.bodies import BALL
 from teamclone.logs import find_matches, read_pair
 from teamclone.rcss import pitch

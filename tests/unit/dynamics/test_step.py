@@ -308,3 +308,7 @@ def test_the_version_is_what_the_parameters_show(params: dict[str, float], versi
     assert rules.version == version
     assert rules.legs == (version == 19)
     assert rules.server["back_dash_rate"] == (0.6 if version == 16 else 0.7)
+
+
+def test_no_cycles_at_all() -> None:
+    assert len(step(at_rest(0), nobody(0), RULES)) == 0

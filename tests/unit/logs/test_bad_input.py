@@ -230,7 +230,14 @@ def test_a_lone_game_log(rcg_of: Callable[[str], Path], tmp_path: Path):
     assert len(match.commands["kind"]) == 0
 
 
-@pytest.mark.parametrize("other", ["goalie3", "crash"])
+def test_a_command_log_of_which_most_was_refused_is_kept(rcg_of: Callable[[str], Path]):
+    match = read_match(rcg_of("refused"))
+    assert match.problems == ()
+    assert len(match.commands["kind"]) == 180
+
+
+# The last one is of a match between the same teams.
+@pytest.mark.parametrize("other", ["goalie3", "crash", "native-v5"])
 def test_the_command_log_of_another_match_is_left_out(rcg_of: Callable[[str], Path], other: str):
     rcl = next(rcg_of(other).parent.glob("*.rcl.gz"))
     match = read_match(rcg_of("v6"), partner=rcl)

@@ -25,7 +25,7 @@ _TAKING_LEGS = (CommandKind.TURN, CommandKind.MOVE, CommandKind.TACKLE, CommandK
 _COLLIDED = state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE
 
 
-def _bodies(frames: Columns, players: Columns) -> Bodies:
+def bodies_of(frames: Columns, players: Columns) -> Bodies:
     """Return ball and players of all frames of a match.
 
     Cycles of being frozen are counted ahead: up to the last frame of the bits of a tackle or foul.
@@ -51,7 +51,7 @@ def _bodies(frames: Columns, players: Columns) -> Bodies:
         on_field=(state & state_bits.STAND) != 0,
         goalie=(state & state_bits.GOALIE) != 0,
         frozen=np.maximum(
-            _left(frames, (state & _TACKLES) != 0, again=_rose(players, CommandKind.TACKLE)),
+            _left(frames, (state & _TACKLES) != 0, again=rose(players, CommandKind.TACKLE)),
             _left(frames, (state & state_bits.FOUL_CHARGED) != 0),
         ),
         banned=np.zeros(state.shape, np.int64),
@@ -107,7 +107,7 @@ class Logged:
             frames, players, log: ``columns.FRAMES``, ``PLAYERS`` and ``COMMANDS``.
             text: gives the text of a command by its index; asked for tackles alone.
         """
-        bodies = _bodies(frames, players)
+        bodies = bodies_of(frames, players)
         kind = executed_kind(frames, players)
         first = first_body_commands(log, frames["playmode"])
         # A frozen player's commands are ignored, but for legs that dash.
@@ -143,7 +143,7 @@ class Logged:
     @property
     def unknown(self) -> NDArray[np.bool_]:
         """(n_frames, 22) where a body command was executed whose numbers no log knows."""
-        dashed = _rose(self.players, CommandKind.DASH) & follows(self.frames)[:, None]
+        dashed = rose(self.players, CommandKind.DASH) & follows(self.frames)[:, None]
         unknown: NDArray[np.bool_] = dashed & np.isnan(self.commands.legs[..., 0]).all(axis=-1)
         unknown |= (self.commands.kind > CommandKind.DASH) & np.isnan(self.commands.numbers[..., 0])
         return unknown
@@ -154,7 +154,7 @@ def _place(log: Columns, index: NDArray[np.int64]) -> tuple[NDArray[np.int64], N
     return log["frame"][index].astype(np.int64), slot_of(log["side"][index], log["unum"][index])
 
 
-def _rose(players: Columns, kind: CommandKind) -> NDArray[np.bool_]:
+def rose(players: Columns, kind: CommandKind) -> NDArray[np.bool_]:
     """Return (n_frames, 22) whether a counter rose until the next frame."""
     counter = players[counter_name(kind)]
     rose = np.zeros(counter.shape, np.bool_)
@@ -169,7 +169,7 @@ def _legs(frames: Columns, players: Columns, log: Columns, accepted: NDArray[np.
     if it is among the ``accepted`` commands.
     """
     legs = np.full((*players["state"].shape, 2, 2), np.nan)
-    dashed = _rose(players, CommandKind.DASH) & follows(frames)[:, None]
+    dashed = rose(players, CommandKind.DASH) & follows(frames)[:, None]
     plain = accepted[(log["kind"][accepted] == CommandKind.DASH) & (log["legs"][accepted] == 0)]
     plain = plain[dashed[_place(log, plain)]]
     legs[_place(log, plain)] = np.stack([log["arg0"][plain], log["arg1"][plain]], axis=-1)[:, None, :]
@@ -197,4 +197,4 @@ def _necks(frames: Columns, players: Columns, log: Columns) -> NDArray[np.float6
         (log["kind"] == CommandKind.TURN_NECK) & log["valid"] & (log["frame"] >= 0) & (log["unum"] > 0)
     )[::-1]  # of several the last written stays: the first in the log
     moments[_place(log, index)] = log["arg0"][index]
-    return np.where(_rose(players, CommandKind.TURN_NECK) & follows(frames)[:, None], moments, 0.0)
+    return np.where(rose(players, CommandKind.TURN_NECK) & follows(frames)[:, None], moments, 0.0)

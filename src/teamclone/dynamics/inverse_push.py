@@ -46,7 +46,6 @@ class _Ball:
         away = (before.x[ball] - before.x[at]) + 1j * (before.y[ball] - before.y[at])
         ahead = np.exp(-1j * body)
         self.distance, self.off_body = np.abs(away), np.angle(away * ahead)
-        self.away = away * ahead
         self.before = (before.vx[ball] + 1j * before.vy[ball]) * ahead
         self.after = (observed.vx[ball] + 1j * observed.vy[ball]) * ahead
         self.blur = observed.blur[ball]
@@ -68,7 +67,10 @@ class Pushes:
 
 
 def kicks(observed: Observed, at: At) -> Pushes:
-    """Return the kicks of some players, each the only one to push the ball in a cycle that the log shows."""
+    """Return the kicks of some players, each the only one to push the ball in a cycle that the log shows.
+
+    A kick with a negative power is given as the one that does as much with a positive power.
+    """
     server, ball = observed.rules.server, _Ball(observed, at)
     of_type = {name: observed.of(at, name) for name in ("player_size", "kickable_margin")}
     rate = formulas.kick_rate(

@@ -127,7 +127,9 @@ def _catch(
     by[at[0][success]] = at[1][success]
     # A ball that is reached and not held turns around, along the direction of the catch.
     along = bodies.vx[at[0], BALL] * np.cos(angle) + bodies.vy[at[0], BALL] * np.sin(angle)
-    along = np.where(np.isnan(chance) | success, 0.0, along)
+    along = np.where(np.isnan(chance) | success | (not rules.catches_fail), 0.0, along)
+    if not rules.catches_fail:
+        tried[at] = success
     x, y = np.zeros(len(bodies)), np.zeros(len(bodies))
     np.add.at(x, at[0], -2.0 * along * np.cos(angle))
     np.add.at(y, at[0], -2.0 * along * np.sin(angle))

@@ -15,6 +15,11 @@ from teamclone.rcss import server_params as server_of
 
 LEGS_SINCE = 19
 """The version of rcssserver from which a player dashes with two legs."""
+CATCHES_FAIL_SINCE = 15
+"""The version from which a goalkeeper that reaches the ball and does not hold it turns the ball around, and waits."""
+
+_KICK_POWER_OF_TYPES = 14
+"""The version from which types have a kick_power_rate of their own, and the server's counts no more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,12 +59,20 @@ class Rules:
         for name in ("wind_rand", "team_actuator_noise"):
             if server[name] != 0:
                 raise UsageError(f"expected a match without wind and noise by team, got {name} = {server[name]:g}")
+        of_type = {name: np.asarray(types[name], np.float64) for name in player_types.FIELDS}
+        if version < _KICK_POWER_OF_TYPES and isinstance(params.get("kick_power_rate"), float):
+            of_type["kick_power_rate"] = np.full_like(of_type["kick_power_rate"], params["kick_power_rate"])
         return cls(
             server=server,
-            types={name: np.asarray(types[name], np.float64) for name in player_types.FIELDS},
+            types=of_type,
             version=version,
             referee=not params.get("coach") or bool(params.get("coach_w_referee")),
         )
+
+    @property
+    def catches_fail(self) -> bool:
+        """Whether a failed catch within reach moves the ball, and bans the goalkeeper from catching."""
+        return self.version >= CATCHES_FAIL_SINCE
 
     @property
     def legs(self) -> bool:

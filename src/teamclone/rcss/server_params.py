@@ -72,9 +72,20 @@ DEFAULTS: dict[str, float] = {
 """Defaults of version 19."""
 
 _BEFORE: tuple[tuple[int, dict[str, float]], ...] = (
+    (
+        14,
+        {
+            "tackle_rand_factor": 1.0,
+            "dash_angle_step": 90.0,
+            "side_dash_rate": 0.25,
+            "back_dash_rate": 0.5,
+            "stamina_capacity": 148600.0,
+        },
+    ),
+    (16, {"dash_angle_step": 45.0}),
     (17, {"back_dash_rate": 0.6, "min_catch_angle": -180.0, "max_catch_angle": 180.0, "min_dash_power": -100.0}),
 )
-"""Defaults of servers before a version, where they differ."""
+"""Defaults of servers before a version, where they differ; the oldest first."""
 
 OLDEST = 16
 """The version whose defaults are used for all before it. A log without a parameter is most likely that old."""
@@ -92,8 +103,15 @@ FURTHER: dict[str, float] = {
 }
 """Defaults of parameters that only the step of a cycle needs (`dynamics`): no dataset and no model has them."""
 
-_NEW_IN = (("dist_noise_rate", 19), ("max_catch_angle", 17))
-"""Parameters that the server lists from a version on."""
+_NEW_IN = (
+    ("dist_noise_rate", 19),
+    ("max_catch_angle", 17),
+    ("illegal_defense_number", 16),
+    ("red_card_probability", 15),
+    ("tackle_rand_factor", 14),
+    ("stamina_capacity", 13),
+)
+"""Parameters that the server lists from a version on; 18 has none of its own, and computes as 17 does."""
 
 FIELDS = tuple(DEFAULTS)
 """The order of the parameters wherever they stand in an array, ``World.server``."""
@@ -115,7 +133,7 @@ def default(name: str, *, version: int | None = None) -> float:
 def version(params: Mapping[str, float | str]) -> int:
     """Return the version of the server whose rules a match was played by, as far as its parameters show it.
 
-    One of 19, 17 (17 and 18 compute alike) and `OLDEST`.
+    17 stands for 18, too. `OLDEST` where the log lists none of the parameters that tell versions apart.
     """
     return next((since for name, since in _NEW_IN if name in params), OLDEST)
 

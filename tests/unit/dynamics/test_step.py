@@ -301,13 +301,34 @@ def test_what_is_not_computed_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("params", "version"), [({}, 16), ({"max_catch_angle": 90.0}, 17), ({"dist_noise_rate": 0.0125}, 19)]
+    ("params", "version"),
+    [
+        ({}, 16),
+        ({"stamina_capacity": 148600.0}, 13),
+        ({"stamina_capacity": 130600.0, "tackle_rand_factor": 2.0}, 14),
+        ({"red_card_probability": 0.0}, 15),
+        ({"illegal_defense_number": 0.0}, 16),
+        ({"max_catch_angle": 90.0}, 17),
+        ({"dist_noise_rate": 0.0125}, 19),
+    ],
 )
 def test_the_version_is_what_the_parameters_show(params: dict[str, float], version: int) -> None:
     rules = Rules.of(params, TYPES)
     assert rules.version == version
     assert rules.legs == (version == 19)
-    assert rules.server["back_dash_rate"] == (0.6 if version == 16 else 0.7)
+    assert rules.server["back_dash_rate"] == {13: 0.5, 17: 0.7, 19: 0.7}.get(version, 0.6)
+    assert rules.server["dash_angle_step"] == {13: 90.0, 14: 45.0, 15: 45.0}.get(version, 1.0)
+    assert rules.server["tackle_rand_factor"] == (1.0 if version == 13 else 2.0)
+
+
+def test_what_versions_before_14_and_15_do_otherwise() -> None:
+    old = Rules.of({"stamina_capacity": 148600.0, "kick_power_rate": 0.016}, TYPES)
+    kicked = step(near_the_ball(), does(5, CommandKind.KICK, 50.0, 0.0), old)
+    assert kicked.x[0, BALL] == pytest.approx(50 * 0.016)
+    bodies = put(put(at_rest(), 0, x=-1.0, y=0.0), BALL, vx=-0.5)
+    missed = step(bodies, does(0, CommandKind.CATCH, 0.0), old, succeeded=np.zeros((1, N_PLAYERS), np.bool_))
+    assert missed.vx[0, BALL] == pytest.approx(-0.5 * BALL_DECAY)
+    assert missed.banned[0, 0] == 0
 
 
 def test_no_cycles_at_all() -> None:

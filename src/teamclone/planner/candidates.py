@@ -13,6 +13,21 @@ from teamclone.planner.scene import Array, kernel
 VALUE = 0
 """Column of what a candidate is worth."""
 
+Mask = NDArray[np.bool_]
+
+
+@kernel
+def cut(allowed: Mask, ends: Mask, begins: NDArray[np.int64]) -> None:
+    """Allow no place of a row from the first on that ends the row.
+
+    Args:
+        allowed, ends: (n,) of places in rows. begins: (rows + 1,) where each row begins, and the last ends.
+    """
+    for row in range(len(begins) - 1):
+        ending = np.flatnonzero(ends[begins[row] : begins[row + 1]])
+        if len(ending):
+            allowed[begins[row] + ending[0] : begins[row + 1]] = False
+
 
 @kernel
 def by_value(made: Array) -> NDArray[np.int64]:

@@ -10,7 +10,7 @@ from teamclone.planner.ball import most_acceleration, speed_over
 from teamclone.planner.candidates import VALUE, by_value, nothing
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.motion import dash_metres
-from teamclone.planner.players import DRIBBLE, HARDLY_M, lateness
+from teamclone.planner.players import DRIBBLE, HARDLY_M, short_m
 from teamclone.planner.scene import (
     ACTOR,
     AWAY,
@@ -88,7 +88,7 @@ def _free(scene: Array, one: Array) -> bool:
         player = scene[opponent]
         ahead, _ = along(player[X] - ball[X], player[Y] - ball[Y], cos, sin)
         seen = player[AWAY] <= SEEN_M and ahead >= DRIBBLE.behind_m
-        if seen and lateness(scene, player, place, cycles, DRIBBLE) <= 0:
+        if seen and short_m(player, place, cycles, DRIBBLE, 0) <= 0:
             return False
     return True
 

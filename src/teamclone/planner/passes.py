@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from teamclone.planner.ball import NEVER_CYCLES, cycles_over, fastest_from, path_along, speed_over
-from teamclone.planner.candidates import VALUE, by_value, nothing
+from teamclone.planner.candidates import VALUE, Mask, by_value, cut, nothing
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.players import (
     BOLD_PASS,
@@ -93,8 +93,6 @@ BOLD_SPEED, LONG_X = 2.0, 25.0
 TO_X, TO_Y, ARRIVES, SPEED, DIRECTION, KICKS, KIND, RECEIVER, COLUMNS = range(1, 10)
 """Columns of a pass, after VALUE, and how many."""
 
-Mask = NDArray[np.bool_]
-
 
 def offsets(rows: Sequence[tuple[ArrayLike, ArrayLike]]) -> tuple[Array, NDArray[np.int64]]:
     """Return (2, n) metres x and y of places in rows, and (len(rows) + 1,) where each row begins, and the last ends.
@@ -123,19 +121,6 @@ def nearest(scene: Array, mate: int, x: Array, y: Array) -> Mask:
             border = 0.5 * (over_x * (other[X] + me[X]) + over_y * (other[Y] + me[Y]))
             near &= over_x * x + over_y * y <= border
     return near
-
-
-@kernel
-def cut(allowed: Mask, ends: Mask, begins: NDArray[np.int64]) -> None:
-    """Allow no place of a row from the first on that ends the row.
-
-    Args:
-        allowed, ends: (n,) of places in rows. begins: (rows + 1,) see `offsets`.
-    """
-    for row in range(len(begins) - 1):
-        ending = np.flatnonzero(ends[begins[row] : begins[row + 1]])
-        if len(ending):
-            allowed[begins[row] + ending[0] : begins[row + 1]] = False
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""The player model: how soon a player can be somewhere, and what it reaches in its next cycle."""
+"""The player model: whether a player can be somewhere in time, and what it reaches in its next cycle."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from teamclone.planner.scene import (
     BALL,
     BODY,
     CATCH,
+    CYCLES,
     DECAY,
-    FROZEN,
     GOALKEEPER,
     LAG,
-    SERVER,
-    TACKLE_CYCLES,
+    PAUSE,
+    ROLL,
     TACKLE_DIST,
     TACKLE_WIDTH,
     TOP,
@@ -41,10 +41,6 @@ HARDLY_M = 0.001
 """Metres that count as nothing."""
 FACED_DEG = 15.0
 """A player dashes without a turn to what is at most so far off its body."""
-MOST_LATE = 2
-"""Cycles by which players may be late that are told apart."""
-FROZEN_PART = 0.5
-"""Of the server's tackle_cycles: how long a player that is tackling goes on with it, on average."""
 
 
 class Allowance(NamedTuple):
@@ -105,8 +101,20 @@ def turns(player: Array, off: float, metres: float, within_m: float) -> int:
 
 
 @kernel
+def covered(player: Array, count: int) -> float:
+    """Return the metres from rest in so many dashes at full power; `dynamics.formulas.covered`.
+
+    A player at its top speed covers TOP in each. From rest it loses what a body rolls whose speed is TOP * DECAY. Minus
+    infinity for less than no dash.
+    """
+    if count < 0:
+        return -math.inf
+    return player[TOP] * (count - player[DECAY] * player[ROLL + min(count, CYCLES)])
+
+
+@kernel
 def dashes(player: Array, metres: float) -> int:
-    """Return the dashes at full power from rest that cover so much, the inverse of `dynamics.formulas.covered`.
+    """Return the dashes at full power from rest that cover so much, the inverse of `covered`.
 
     A player at its top speed needs s = metres / TOP cycles. From rest n = s + LAG * (1 - DECAY ** n), to which Newton's
     steps lead from above.
@@ -125,31 +133,30 @@ def dashes(player: Array, metres: float) -> int:
 
 
 @kernel
-def lateness(scene: Array, player: Array, place: tuple[float, float], cycle: int, allowance: Allowance) -> int:
-    """Return by how many cycles a player misses a ball that is in a place after ``cycle`` of them; 0 or less: has it.
+def short_m(player: Array, place: tuple[float, float], cycle: int, allowance: Allowance, later: int) -> float:
+    """Return the metres by which a player misses a ball that is in a place after ``cycle`` cycles; 0 or less: has it.
 
-    The player has so many cycles, less those of its turns and of a tackle that still goes on. In what is left its
-    dashes have to cover the way from where it drifts to. NEVER_CYCLES if it is clearly too late.
+    The player has the ball within the larger of two radii around where it drifts to: `stand`, in which it need not
+    dash, and `run`, up to which its dashes carry the reach in the cycles that turns and a tackle under way leave.
+
+    Args:
+        later: cycles by which the player may be late and still has it.
     """
     drift_x, drift_y = inertia_point(player, cycle)
     x, y = place[0] - drift_x, place[1] - drift_y
     metres, reach = math.hypot(x, y), reach_of(player, place[0], place[1])
-    if metres < reach + allowance.touch_m + HARDLY_M:
-        return -cycle
-    stretched = allowance.reach * reach + allowance.ahead_m if cycle >= allowance.reach_from else 0.0
-    to_dash = metres - allowance.unsure * player[AWAY] - stretched
-    left = cycle + int(allowance.early + (place[0] < allowance.early_x) + (place[0] < allowance.earlier_x))
-    too_far = to_dash > player[TOP] * (left + MOST_LATE)
-    if too_far or allowance.bound * (metres - reach) > player[TOP] * cycle:
-        return NEVER_CYCLES
-    if player[FROZEN] > 0:
-        left -= int(FROZEN_PART * scene[SERVER, TACKLE_CYCLES])
     off = abs(turned(direction(x, y) - player[BODY]))
     backwards = metres < allowance.back_m and off > 90.0
     turning = turns(player, 180.0 - off if backwards else off, metres, reach + allowance.turn_m)
-    if turning > 0:  # and sees the ball a cycle late
-        left -= turning + 1
-    return dashes(player, to_dash) - left
+    turning += min(turning, 1)  # after turns it sees the ball a cycle late
+    early = allowance.early + (place[0] < allowance.early_x) + (place[0] < allowance.earlier_x)
+    count = cycle + later + int(early - player[PAUSE]) - turning
+    stretched = allowance.reach * reach + allowance.ahead_m if cycle >= allowance.reach_from else 0.0
+    stand = reach + allowance.touch_m
+    run = stretched + allowance.unsure * player[AWAY] + covered(player, count)
+    if allowance.bound * (metres - reach) > player[TOP] * cycle:
+        run = -math.inf
+    return metres - max(stand, run) - HARDLY_M
 
 
 @kernel
@@ -175,7 +182,7 @@ def intercept(scene: Array, player: Array, path: Path, cycles: tuple[int, int], 
     NEVER_CYCLES if in none of them.
     """
     for cycle in range(cycles[0], cycles[1] + 1):
-        if lateness(scene, player, ball_after(scene, path, cycle), cycle, allowance) <= 0:
+        if short_m(player, ball_after(scene, path, cycle), cycle, allowance, 0) <= 0:
             return cycle
     return NEVER_CYCLES
 

@@ -23,14 +23,17 @@ OPPONENT, BALL, ACTOR, SERVER, ROWS = N_TEAM, N_PLAYERS, N_PLAYERS + 1, N_PLAYER
 """Rows: the team, from OPPONENT on the opponents, the ball, once more the player who acts, and the server's parameters.
 A player who is not on the field is far away."""
 
-(X, Y, VX, VY, BODY, STAMINA, EFFORT, RECOVERY, CAPACITY, PRESENT, GOALKEEPER, FROZEN, TOUCH, MARGIN, AREA, CATCH,
- DASH_RATE, DASH_ACCEL, DECAY, INERTIA, SPEED_MAX, STAMINA_INC, EXTRA, EFFORT_MIN, EFFORT_MAX, KICK_RATE, KICK_RAND,
- TOP, LAG, AWAY, RECEIVES, TURN) = range(32)  # fmt: skip
-"""Columns of a player. FROZEN: is tackling; TOUCH: metres between the centres of player and ball that touch; MARGIN: by
-how much farther the player can kick it; AREA: both; CATCH: metres to which a goalkeeper catches in its penalty area.
-DASH_ACCEL: metres per cycle that a dash at full power adds; TOP: speed that such dashes lead to; LAG: by how many
-cycles a player that starts from rest is behind one at that speed. AWAY: metres from the actor. RECEIVES: may get a
-pass. From TURN on: degrees that 1, 2, ... turns turn the player."""
+(X, Y, VX, VY, BODY, STAMINA, EFFORT, RECOVERY, CAPACITY, PRESENT, GOALKEEPER, FROZEN, PAUSE, TOUCH, MARGIN, AREA,
+ CATCH, DASH_RATE, DASH_ACCEL, DECAY, INERTIA, SPEED_MAX, STAMINA_INC, EXTRA, EFFORT_MIN, EFFORT_MAX, KICK_RATE,
+ KICK_RAND, TOP, LAG, AWAY, RECEIVES, TURN) = range(33)  # fmt: skip
+"""Columns of a player. FROZEN: is tackling; PAUSE: cycles for which it goes on with it, on average. TOUCH: metres
+between the centres of player and ball that touch; MARGIN: by how much farther the player can kick it; AREA: both;
+CATCH: metres to which a goalkeeper catches in its penalty area. DASH_ACCEL: metres per cycle that a dash at full power
+adds; TOP: speed that such dashes lead to; LAG: by how many cycles a player that starts from rest is behind one at that
+speed. AWAY: metres from the actor. RECEIVES: may get a pass. From TURN on: degrees that 1, 2, ... turns turn the
+player."""
+PAUSE_PART = 0.5
+"""Of the server's tackle_cycles: PAUSE of a player that is tackling."""
 TURNS = 8
 """Turns of which the degrees are kept."""
 ROLL = TURN + TURNS
@@ -44,11 +47,11 @@ GAIN, OFFSIDE = BODY, STAMINA
 FAR_AWAY_M = 1e6
 
 (BALL_DECAY, BALL_SPEED_MAX, BALL_ACCEL_MAX, BALL_SIZE, BALL_RAND, PLAYER_RAND, MAX_POWER, MAX_DASH, TACKLE_DIST,
- TACKLE_WIDTH, TACKLE_EXPONENT, FOUL_EXPONENT, TACKLE_CYCLES, TACKLE_RATE, TACKLE_POWER,
- TACKLE_BACK_POWER) = (SERVER_FIELD[name] for name in (
-    "ball_decay", "ball_speed_max", "ball_accel_max", "ball_size", "ball_rand", "player_rand", "maxpower",
-    "max_dash_power", "tackle_dist", "tackle_width", "tackle_exponent", "foul_exponent", "tackle_cycles",
-    "tackle_power_rate", "max_tackle_power", "max_back_tackle_power"))  # fmt: skip
+ TACKLE_WIDTH, TACKLE_EXPONENT, FOUL_EXPONENT, TACKLE_RATE, TACKLE_POWER, TACKLE_BACK_POWER) = (
+    SERVER_FIELD[name] for name in (
+        "ball_decay", "ball_speed_max", "ball_accel_max", "ball_size", "ball_rand", "player_rand", "maxpower",
+        "max_dash_power", "tackle_dist", "tackle_width", "tackle_exponent", "foul_exponent", "tackle_power_rate",
+        "max_tackle_power", "max_back_tackle_power"))  # fmt: skip
 """Columns of the server."""
 
 GOAL_X, GOAL_Y = pitch.HALF_LENGTH, pitch.GOAL_WIDTH / 2
@@ -95,6 +98,7 @@ def scenes(ball: Array, players: Array, types: Array, server: Array) -> Array:
     for column, name in _FIELDS:
         rows[..., column] = types[..., TYPE_FIELD[name]]
     of = {name: server[:, None, index] for name, index in SERVER_FIELD.items()}
+    rows[..., PAUSE] = rows[..., FROZEN] * np.trunc(PAUSE_PART * of["tackle_cycles"])
     rows[..., TOUCH] += of["ball_size"]
     rows[..., AREA] = rows[..., TOUCH] + rows[..., MARGIN]
     rows[..., CATCH] = np.hypot(of["catchable_area_l"], of["catchable_area_w"] / 2)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teamclone.planner.ball import ball_after, path_along
-from teamclone.planner.candidates import by_value, nothing
+from teamclone.planner.candidates import by_value, cut, nothing
 from teamclone.planner.dribble import ARRIVES, COLUMNS, DIRECTION, SPEED, TO_X, TO_Y, meet
 from teamclone.planner.motion import dash_metres
-from teamclone.planner.players import SELF_PASS, SELF_PASS_AHEAD, bearing, lateness, pose_after
+from teamclone.planner.players import SELF_PASS, SELF_PASS_AHEAD, bearing, pose_after, short_m
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
@@ -20,13 +19,14 @@ from teamclone.planner.scene import (
     GOAL_X,
     LINE_Y,
     OPPONENT,
+    ROLL,
     TURN,
+    VX,
+    VY,
     Array,
     X,
     Y,
     along,
-    gap,
-    inertia_point,
     kernel,
     turned,
 )
@@ -62,45 +62,44 @@ def _free(scene: Array, one: Array) -> bool:
             return False
         before, _ = along(player[X] - ball[X], player[Y] - ball[Y], path.cos, path.sin)
         allowance = SELF_PASS_AHEAD if before > IN_THE_WAY_M else SELF_PASS
-        if before >= allowance.behind_m and lateness(scene, player, place, cycles, allowance) <= 0:
+        if before >= allowance.behind_m and short_m(player, place, cycles, allowance, 0) <= 0:
             return False
     return True
 
 
 @kernel
-def _counts(most: int) -> NDArray[np.int64]:
-    """Return the numbers of dashes that are tried where there may be so many, the greatest first."""
-    counts = np.arange(most, LEAST_DASHES - 1, -1)
-    return counts[(counts < STRIDE_DASHES) | ((most - counts) % 2 == 0)]
-
-
-@kernel
 def _self_passes(scene: Array) -> Array:
-    """Return (n, COLUMNS) the self passes that one kick begins, whatever opponents do."""
+    """Return (n, COLUMNS) the self passes that one kick begins, whatever opponents do.
+
+    The places where they may end are a grid: a row for each direction, a column for each number of dashes. A row ends
+    before the first place that is too near to a line or out of the actor's strength.
+    """
     me, ball = scene[ACTOR], scene[BALL]
-    zone = int(np.searchsorted(np.array(MOST_X), ball[X], side="right"))
-    metres = np.empty((2, MOST_DASHES[zone]))
-    strong = [dash_metres(scene, 1 + turns, RESERVE, True, metres[turns]) for turns in range(2)]
+    most = MOST_DASHES[int(np.searchsorted(np.array(MOST_X), ball[X], side="right"))]
+    strong, metres, drift = np.empty(2, np.int64), np.empty((2, most)), np.empty((2, most))
+    for waits in (1, 2):
+        strong[waits - 1] = dash_metres(scene, waits, RESERVE, True, metres[waits - 1])
+        drift[waits - 1] = me[ROLL + waits + 1 : ROLL + waits + 1 + most]
+    rows, dashes = np.arange(DIRECTIONS), np.arange(1, most + 1)
+    off, turns = turned(STEP_DEG * rows), np.minimum(rows, 1)
+    angle = turned(me[BODY] + off).reshape(-1, 1)
+    x = me[X] + me[VX] * drift[turns] + metres[turns] * np.cos(np.radians(angle))
+    y = me[Y] + me[VY] * drift[turns] + metres[turns] * np.sin(np.radians(angle))
+
     one_turn, widest = me[TURN + 1] - me[TURN], WIDEST_DEG if ball[X] < FORWARD_X else 180.0
-    made, count = np.empty((DIRECTIONS * MOST_DASHES[zone], COLUMNS)), 0
-    for index in range(DIRECTIONS):
-        off, turns = turned(STEP_DEG * index), min(index, 1)
-        angle = turned(me[BODY] + off)
-        if abs(off) > one_turn or abs(angle) > widest:
-            continue
-        cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-        places, inside = np.empty((strong[turns], 2)), strong[turns]
-        for dashes in range(1, strong[turns] + 1):
-            drift_x, drift_y = inertia_point(me, 1 + turns + dashes)
-            x, y = drift_x + metres[turns, dashes - 1] * cos, drift_y + metres[turns, dashes - 1] * sin
-            places[dashes - 1] = x, y
-            if x > GOAL_X - INSIDE_M[0] or (abs(y) > LINE_Y - INSIDE_M[1] and y * angle > 0):
-                inside = min(inside, dashes - 1)
-        for dashes in _counts(inside):
-            x, y = places[dashes - 1]
-            away = gap(x, y, -GOAL_X, 0.0) >= OWN_GOAL_M
-            if away and meet(scene, x, y, 1 + turns + dashes, made[count]):
-                count += 1
+    allowed = (np.abs(off) <= one_turn).reshape(-1, 1) & (np.abs(angle) <= widest)
+    allowed = allowed & (dashes <= strong[turns].reshape(-1, 1))
+    ends = (x > GOAL_X - INSIDE_M[0]) | ((np.abs(y) > LINE_Y - INSIDE_M[1]) & (y * angle > 0))
+    cut(allowed.reshape(-1), ends.reshape(-1), most * np.arange(DIRECTIONS + 1))
+    last = allowed.sum(axis=1).reshape(-1, 1)
+    allowed &= (dashes >= LEAST_DASHES) & ((dashes < STRIDE_DASHES) | ((last - dashes) % 2 == 0))
+    allowed &= np.hypot(x + GOAL_X, y) >= OWN_GOAL_M
+
+    chosen = np.flatnonzero(allowed[:, ::-1])  # of equal values the one with most dashes comes first
+    made, count = np.empty((len(chosen), COLUMNS)), 0
+    for place in chosen:
+        row, column = place // most, most - 1 - place % most
+        count += meet(scene, x[row, column], y[row, column], 1 + turns[row] + dashes[column], made[count])
     return made[:count]
 
 

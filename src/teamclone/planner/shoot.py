@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.planner.ball import NEVER_CYCLES, Path, ball_after, cycles_over, fastest_from
-from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, first_cycles, lateness
+from teamclone.planner.players import SHOT, SHOT_GOALKEEPER, first_cycles, short_m
 from teamclone.planner.scene import (
     ACTOR,
     BALL,
@@ -90,8 +90,8 @@ def _goalkeeper_apart(scene: Array, angle: float) -> float:
 
 
 @kernel
-def _lateness(scene: Array, defenders: Indices, path: Path, cycles: int) -> tuple[int, int]:
-    """Return by how many cycles the goalkeeper and the others miss a shot at least; 0 or less where one saves it.
+def _defended(scene: Array, defenders: Indices, path: Path, cycles: int) -> tuple[bool, bool, bool]:
+    """Return whether an opponent saves a shot, whether the goalkeeper comes near it, and whether another one does.
 
     Args:
         defenders: rows of the scene. cycles: after which the ball is in the goal.
@@ -101,20 +101,21 @@ def _lateness(scene: Array, defenders: Indices, path: Path, cycles: int) -> tupl
     for place, row in enumerate(defenders):
         if along(scene[row, X] - me[X], scene[row, Y] - me[Y], path.cos, path.sin)[0] < 0:
             first[place] = NEVER_CYCLES
-    late = NEVER_CYCLES, NEVER_CYCLES
+    near, others_near = False, False
     for cycle in range(1, min(cycles, CYCLES)):
         at = ball_after(scene, path, cycle)
         hands = in_their_area(at[0], at[1])
-        for place, row in enumerate(defenders):
-            if first[place] > cycle:
-                continue
-            if hands and scene[row, GOALKEEPER] > 0:
-                late = min(late[0], lateness(scene, scene[row], at, cycle, SHOT_GOALKEEPER)), late[1]
+        for row in defenders[first <= cycle]:
+            player = scene[row]
+            if hands and player[GOALKEEPER] > 0:
+                near = near or short_m(player, at, cycle, SHOT_GOALKEEPER, LATE_CYCLES) <= 0
+                saved = near and short_m(player, at, cycle, SHOT_GOALKEEPER, 0) <= 0
             else:
-                late = late[0], min(late[1], lateness(scene, scene[row], at, cycle, SHOT))
-        if min(late) <= 0:
-            break
-    return late
+                others_near = others_near or short_m(player, at, cycle, SHOT, OTHERS_LATE_CYCLES) <= 0
+                saved = others_near and short_m(player, at, cycle, SHOT, 0) <= 0
+            if saved:
+                return True, near, others_near
+    return False, near, others_near
 
 
 @kernel
@@ -148,15 +149,14 @@ def best_shot(scene: Array) -> tuple[float, float, float, float]:
         for step in range(steps + 1):
             speed = slowest[place] + FASTER * step if step < steps else fastest
             cycles = cycles_over(metres[place], speed, server[BALL_DECAY])
-            late, others = _lateness(scene, defenders, Path(speed, cos[place], sin[place]), cycles)
-            if min(late, others) <= 0:
+            saved, near, others_near = _defended(scene, defenders, Path(speed, cos[place], sin[place]), cycles)
+            if saved:
                 continue
-            far_late, others_far = late > LATE_CYCLES, others > OTHERS_LATE_CYCLES
-            value = 1.0 + ONE_KICK_VALUE * (speed <= one_kick[place] + EQUAL) + NEAR_VALUE * (far_late + others_far)
-            value *= by_place[place] * beside[place, int(far_late)]
+            value = 1.0 + ONE_KICK_VALUE * (speed <= one_kick[place] + EQUAL) + NEAR_VALUE * (2 - near - others_near)
+            value *= by_place[place] * beside[place, int(not near)]
             if value > values[place]:
                 values[place], speeds[place] = value, speed
-            if far_late and others_far:  # no harder shot is worth more
+            if not near and not others_near:  # no harder shot is worth more
                 break
     best = np.argmax(values)
     return x, places[best], speeds[best], one_kick[best]

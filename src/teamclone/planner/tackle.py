@@ -11,7 +11,7 @@ from teamclone.planner.players import (
     HARDLY_M,
     TACKLE,
     first_cycles,
-    lateness,
+    short_m,
     tackle_chance,
 )
 from teamclone.planner.scene import (
@@ -78,7 +78,7 @@ def _opponents_after(scene: Array, path: Path) -> int:
     for cycle in range(1, min(CYCLES, out)):
         place = ball_after(scene, path, cycle)
         for row in rows[first <= cycle]:
-            if lateness(scene, scene[row], place, cycle, TACKLE) <= 0:
+            if short_m(scene[row], place, cycle, TACKLE, 0) <= 0:
                 return cycle
     return NEVER_CYCLES
 

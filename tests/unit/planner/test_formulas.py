@@ -124,6 +124,13 @@ def cycles_over(random: Random) -> tuple[float, float]:
     return ball.cycles_over(metres, speed, decay), math.ceil(formulas.cycles_over(metres, speed, decay))
 
 
+def covered(random: Random) -> tuple[float, float]:
+    _, of_type, _, me = drawn(random)
+    me[scene.TOP] = me[scene.DASH_ACCEL] / (1 - of_type["player_decay"])
+    count = int(random.integers(0, 60))
+    return players.covered(me, count), formulas.covered(count, me[scene.DASH_ACCEL], of_type["player_decay"])
+
+
 def dashes(random: Random) -> tuple[float, float]:
     """So many dashes cover the way, and one less does not."""
     _, of_type, _, me = drawn(random)
@@ -146,7 +153,7 @@ def rested(random: Random) -> tuple[object, object]:
 
 
 FORMULAS = (kick_rate, kickable_area, dash_rate, limited, fastest, turn, turns, tackle_failure, tackle_power, roll,
-            inertia_point, cycles_over, dashes, rested)  # fmt: skip
+            inertia_point, cycles_over, covered, dashes, rested)  # fmt: skip
 
 
 @pytest.mark.parametrize("both", FORMULAS, ids=lambda both: both.__name__)

@@ -50,13 +50,6 @@ def test_nearest_are_the_places_that_are_nearest() -> None:
         np.testing.assert_array_equal(near, metres.argmin(axis=0) == place)
 
 
-def test_a_row_ends_at_the_first_place_that_ends_it() -> None:
-    allowed = np.array([True, False, True, True, True, True, True])
-    ends = np.array([False, False, True, False, False, False, True])
-    passes.cut(allowed, ends, np.array([0, 4, 6, 7]))
-    assert allowed.tolist() == [True, False, False, False, True, True, False]
-
-
 @pytest.mark.parametrize("decay", [0.9, 0.94, 0.96])
 def test_cycles_after_which_the_ball_is_slow(decay: float) -> None:
     """The ball of so many cycles is slow enough where it gets to, that of one less is not."""

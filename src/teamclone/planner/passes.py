@@ -223,10 +223,9 @@ def _cycles_of_through(player: Array, place: tuple[float, float], degrees: float
     (x, y), (rest_x, rest_y) = place, at_rest(player)
     run, vx, vy = _run(player, place, 0, 1.0), player[VX], player[VY]
     off = turned(direction(vx, vy) - direction(x - rest_x, y - rest_y))
-    if math.hypot(vx, vy) > RUNS and abs(off) < FOLLOWS_DEG:
-        return run
+    aside = math.hypot(vx, vy) <= RUNS or abs(off) >= FOLLOWS_DEG
     near_edge = max(x - GOAL_X, abs(y) - LINE_Y) > -NEAR_EDGE_M
-    return run + (2 if near_edge and abs(degrees) > STEEP_DEG and run >= LONG_RUN else 1)
+    return run + aside + (aside and near_edge and abs(degrees) > STEEP_DEG and run >= LONG_RUN)
 
 
 @kernel

@@ -90,14 +90,14 @@ def reach_of(player: Array, x: float, y: float) -> float:
 
 @kernel
 def turns(player: Array, off: float, metres: float, within_m: float) -> int:
-    """Return the turns until a player faces what is ``off`` degrees aside and so far away, to ``within_m`` of it."""
+    """Return the turns until a player faces what is ``off`` degrees aside and so far away, to ``within_m`` of it.
+
+    At most TURNS.
+    """
     if metres <= within_m:
         return 0
     over = abs(off) - max(FACED_DEG, math.degrees(math.asin(within_m / metres)))
-    count = 0
-    while count < TURNS and over > (player[TURN + count - 1] if count else 0.0):
-        count += 1
-    return count
+    return int(np.searchsorted(player[TURN : TURN + TURNS], over))
 
 
 @kernel

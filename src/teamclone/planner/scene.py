@@ -30,7 +30,7 @@ A player who is not on the field is far away."""
 between the centres of player and ball that touch; MARGIN: by how much farther the player can kick it; AREA: both;
 CATCH: metres to which a goalkeeper catches in its penalty area. DASH_ACCEL: metres per cycle that a dash at full power
 adds; TOP: speed that such dashes lead to; LAG: by how many cycles a player that starts from rest is behind one at that
-speed. AWAY: metres from the actor. RECEIVES: may get a pass. From TURN on: degrees that 1, 2, ... turns turn the
+speed. AWAY: metres from the actor. RECEIVES: may get a pass. From TURN on: degrees that 0, 1, ... turns turn the
 player."""
 PAUSE_PART = 0.5
 """Of the server's tackle_cycles: PAUSE of a player that is tackling."""
@@ -124,8 +124,8 @@ def complete(scene: Array, actor: int) -> None:
             break
         speed, degrees = math.hypot(body[VX], body[VY]), 0.0
         for turn in range(TURNS):
-            degrees += most_turn(body, speed)
             body[TURN + turn] = degrees
+            degrees += most_turn(body, speed)
             speed *= body[DECAY]
         body[AWAY] = gap(body[X], body[Y], scene[actor, X], scene[actor, Y])
     scene[ACTOR] = scene[actor]

@@ -86,7 +86,7 @@ def _self_passes(scene: Array) -> Array:
     x = me[X] + me[VX] * drift[turns] + metres[turns] * np.cos(np.radians(angle))
     y = me[Y] + me[VY] * drift[turns] + metres[turns] * np.sin(np.radians(angle))
 
-    one_turn, widest = me[TURN + 1] - me[TURN], WIDEST_DEG if ball[X] < FORWARD_X else 180.0
+    one_turn, widest = me[TURN + 2] - me[TURN + 1], WIDEST_DEG if ball[X] < FORWARD_X else 180.0
     allowed = (np.abs(off) <= one_turn).reshape(-1, 1) & (np.abs(angle) <= widest)
     allowed = allowed & (dashes <= strong[turns].reshape(-1, 1))
     ends = (x > GOAL_X - INSIDE_M[0]) | ((np.abs(y) > LINE_Y - INSIDE_M[1]) & (y * angle > 0))

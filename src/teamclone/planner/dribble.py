@@ -105,9 +105,8 @@ def _allowed(me: Array, angle: float) -> bool:
 def _dribbles(scene: Array) -> Array:
     """Return (n, COLUMNS) the dribbles that one kick begins, whatever opponents do."""
     me = scene[ACTOR]
-    turnable = (
-        me[TURN + 1 : TURN + MOST_TURNS + 2] - me[TURN + 1]
-    )  # turns follow the kick: the player is slower by a cycle
+    first, last = TURN + 1, TURN + 1 + MOST_TURNS  # turns follow the kick: the player is slower by a cycle
+    turnable = me[first : last + 1] - me[first]
     run_m = np.empty((MOST_TURNS + 1, DASHES[1]))
     for turns in range(MOST_TURNS + 1):
         dash_metres(scene, 1 + turns, RESERVE, False, run_m[turns])

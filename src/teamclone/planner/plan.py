@@ -24,7 +24,7 @@ from teamclone.planner.dribble import best_dribble
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.hold_ball import hold_ball, stays
 from teamclone.planner.keep_dribble import underway
-from teamclone.planner.kick_table import ORDER_FIELDS, Target, best_sequence, cut_off, kick_order
+from teamclone.planner.kick_sequences import ORDER_FIELDS, Target, best_sequence, cut_off, kick_order
 from teamclone.planner.passes import best_pass
 from teamclone.planner.scene import (
     ACTOR,

@@ -35,16 +35,26 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "training": (*BASE, "world", "dataset", "models"),
     "search": (*BASE, "plots", "dataset", "models", "training"),
     "evaluation": (*BASE, "plots", "logs", "world", "dataset", "models", "training"),
+    "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation"),
     "api": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline"),
-    "cli": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline", "api"),
+    "cli": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "rollouts", "pipeline", "api"),
     PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "api"),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""
 
 
-MAY_IMPORT_TORCH = ("world.state", "world.mirror", "dataset.reader", "models", "training", "search", "evaluation")
+MAY_IMPORT_TORCH = (
+    "world.state",
+    "world.mirror",
+    "dataset.reader",
+    "models",
+    "training",
+    "search",
+    "evaluation",
+    "rollouts",
+)
 
 MOST_LINES = 80
 KERNEL = re.compile(r"_?(njit|kernel|helper)\b")

@@ -44,6 +44,11 @@ class Answer(ABC):
         return self.raw_logits / self.temperature
 
     @property
+    def answered_logits(self) -> Tensor:
+        """(batch, commands) `logits`, of kicks and tackles -inf where the answer leaves them out."""
+        return self.logits
+
+    @property
     def probabilities(self) -> Tensor:
         """(batch, commands) probabilities, calibrated by the temperature."""
         return self.logits.softmax(1)
@@ -70,13 +75,12 @@ class Answer(ABC):
     def sample(self, generator: torch.Generator | None = None) -> Target:
         """Draw a command for each situation, then its parameters, clipped as the server clips them.
 
+        In situations whose kicks and tackles the answer leaves out none is drawn.
+
         Args:
             generator: source of the random numbers, on the device of the answer; None takes PyTorch's own.
-
-        Raises:
-            ValueError: the answer leaves out kicks and tackles of some situations.
         """
-        kind = draw(self.logits, generator)
+        kind = draw(self.answered_logits, generator)
         return Target(kind, self.draw_parameters(kind, generator))
 
 

@@ -43,6 +43,12 @@ class EnsembleAnswer(Answer):
         logits: Tensor = self.merged.raw_logits
         return logits
 
+    @property
+    def answered_logits(self) -> Tensor:
+        """Those of `merged`, see `Answer.answered_logits`."""
+        logits: Tensor = self.merged.answered_logits
+        return logits
+
     def point(self) -> Prediction:
         """Return the likeliest answer, that of `merged`."""
         prediction: Prediction = self.merged.point()

@@ -107,6 +107,18 @@ class MixtureAnswer(Answer):
         super().__init__(distribution.logits, temperature)
         self.distribution = distribution
 
+    @property
+    def answered_logits(self) -> Tensor:
+        """See `Answer.answered_logits`."""
+        rows = self.distribution.kick_rows
+        if rows is None:
+            return self.logits
+        left_out = torch.ones_like(self.logits, dtype=torch.bool)
+        left_out[:, : min(WITH_BALL)] = False
+        left_out[:, max(WITH_BALL) + 1 :] = False
+        left_out[rows] = False
+        return self.logits.masked_fill(left_out, -math.inf)
+
     def point(self) -> Prediction:
         """Return the single best answer: of each mixture the weighted medoid of its components."""
         of = self.distribution
@@ -140,14 +152,8 @@ class MixtureAnswer(Answer):
         return _chosen(self.distribution, target, [_mean_kick(self.distribution.kick)])
 
     def draw_parameters(self, kind: Tensor, generator: torch.Generator | None) -> Tensor:
-        """Draw (batch, 2) parameters of these commands, see `Answer.draw_parameters`.
-
-        Raises:
-            ValueError: the answer leaves out kicks.
-        """
+        """Draw (batch, 2) parameters of these commands, see `Answer.draw_parameters`; 0 of kicks left out."""
         of = self.distribution
-        if of.kick_rows is not None:
-            raise ValueError("cannot sample an answer that leaves out kicks; ask the clone without kick_rows=")
         kick, nothing = _mean_kick(of.kick), torch.zeros_like(of.turn_factor)
         power = mixture.draw_component(of.dash_power.logits, generator)
         turn, kicked = (mixture.draw_component(one.logits, generator) for one in (of.turn, kick.power))
@@ -158,10 +164,10 @@ class MixtureAnswer(Answer):
             ),
             (mixture.draw_angle(of.turn, turn, generator, factor=of.turn_factor), nothing),
             (
-                mixture.draw_value(kick.power, kicked, generator, low=0.0, high=100.0),
-                mixture.draw_angle(kick.direction, kicked, generator),
+                _spread(mixture.draw_value(kick.power, kicked, generator, low=0.0, high=100.0), of),
+                _spread(mixture.draw_angle(kick.direction, kicked, generator), of),
             ),
-            (mixture.draw_direction(kick.tackle, generator), nothing),
+            (_spread(mixture.draw_direction(kick.tackle, generator), of), nothing),
         ]
         if of.catch is not None:
             pairs.append((mixture.draw_direction(of.catch, generator), nothing))

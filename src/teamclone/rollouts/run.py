@@ -1,0 +1,275 @@
+"""``roll_out``: a clone many cycles ahead from frames of matches, beside what happened and what plain guesses give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from teamclone.dynamics.audit import rules_of
+from teamclone.dynamics.bodies import BALL, N_BODIES
+from teamclone.dynamics.logged import Logged
+from teamclone.dynamics.rules import Rules
+from teamclone.errors import TeamcloneError, UsageError
+from teamclone.evaluation.prediction_table import MatchColumns
+from teamclone.logs import read_match
+from teamclone.logs.align import follows
+from teamclone.rcss.players import N_PLAYERS
+from teamclone.rcss.playmodes import PlayMode
+from teamclone.rollouts.measure import Ahead, measure
+from teamclone.rollouts.policies import AsLogged, Cloned, GoingOn, Policy
+from teamclone.rollouts.scene import Scene, slots_of
+from teamclone.rollouts.simulate import simulate
+from teamclone.world.view import view
+from teamclone.world.world import World
+
+if TYPE_CHECKING:
+    from teamclone.models.clone import Clone
+
+MOST_WORLDS = 512
+"""Worlds that go ahead together; bounds memory."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RolloutConfig:
+    """What is rolled out.
+
+    Attributes:
+        horizon: cycles ahead. samples: of each start. starts: of each match, drawn from all cycles of play_on.
+        others: what the other team does: "logged", "last" (go on as in the last cycle), or "clone".
+        seed: of starts, samples and noise.
+    """
+
+    horizon: int = 50
+    samples: int = 32
+    starts: int = 50
+    others: str = "logged"
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchRollouts:
+    """The roll-outs of one match.
+
+    Attributes:
+        path, match_id, side: the match, and the side of the team that the clone plays. error: why there are none.
+        starts: (starts,) frames of the match. reach: (starts,) cycles that their stretch of play goes on.
+        own: (starts, 22) which players the clone moves.
+        truth: (starts, horizon + 1, 23, 2) metres in the log's frame of reference.
+        places: by who moves the players, (starts, samples, horizon + 1, 23, 2) metres: ``samples``, ``likeliest``, and
+            the guesses ``stand``, ``coast`` and ``last``.
+    """
+
+    path: Path
+    match_id: str | None = None
+    side: int = 1
+    error: str | None = None
+    starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    cycles: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    reach: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    own: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, N_PLAYERS), np.bool_))
+    truth: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 1, N_BODIES, 2), np.float32))
+    places: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+
+
+def roll_out(
+    model: Clone,
+    path: Path,
+    config: RolloutConfig,
+    *,
+    team: str | None,
+    side: str | None = None,
+    other: Clone | None = None,
+    on_cycle: Callable[[], None] | None = None,
+) -> MatchRollouts:
+    """Return the roll-outs of a clone in one match.
+
+    Args:
+        model: the clone; it plays the field players of its team, and the goalkeeper if it knows catch.
+        path: the game log; the command log is found beside it.
+        team: name of the team that it plays. side: "left" or "right", in its place.
+        other: the clone that plays the other team where ``config.others`` is "clone".
+        on_cycle: called after each cycle of each batch of worlds.
+
+    Raises:
+        UsageError: the team does not play, the log does not state its rules, or no play goes on for a cycle.
+        LogError: the log cannot be read.
+    """
+    match = read_match(path)
+    ours = MatchColumns.of(match).side_of(team, side)
+    rules = rules_of(match.game.server_params, match.game.player_types)
+    logged, world = Logged.of(match), view(match, side=1)
+    left = _cycles_left(logged)
+    rng = np.random.default_rng(config.seed)
+    possible = np.flatnonzero(left > 0)
+    if not len(possible):
+        raise UsageError(f"{path}: expected cycles of play_on, got none")
+    starts = np.sort(rng.choice(possible, min(config.starts, len(possible)), replace=False))
+    job = _Job(model, other, logged, world, rules, ours, config, on_cycle)
+    last = len(left) - 1
+    at = np.minimum(starts[:, None] + np.arange(config.horizon + 1), last)
+    truth = np.stack([logged.bodies.x[at], logged.bodies.y[at]], axis=-1).astype(np.float32)
+    return MatchRollouts(
+        path=path,
+        match_id=match.match_id,
+        side=ours,
+        starts=starts,
+        cycles=match.frames["cycle"][starts],
+        reach=left[starts],
+        own=job.moved(starts),
+        truth=truth,
+        places={"samples": job.samples(starts), "likeliest": job.likeliest(starts), **job.guesses(starts, truth)},
+    )
+
+
+def in_matches(
+    model: Clone,
+    paths: Sequence[Path],
+    config: RolloutConfig,
+    *,
+    team: str | None,
+    side: str | None = None,
+    other: Clone | None = None,
+    on_match: Callable[[Path], Callable[[], None] | None] | None = None,
+) -> list[MatchRollouts]:
+    """Return the roll-outs of all matches; one that fails costs no other, and says why. See `roll_out`."""
+    found = []
+    for path in paths:
+        try:
+            on_cycle = None if on_match is None else on_match(path)
+            found.append(roll_out(model, path, config, team=team, side=side, other=other, on_cycle=on_cycle))
+        except (TeamcloneError, OSError) as error:
+            found.append(MatchRollouts(path=path, error=str(error)))
+    return found
+
+
+def figures(matches: Sequence[MatchRollouts]) -> dict[str, dict[str, list[dict[str, Any]]]]:
+    """Return the errors of all matches together: by who moves the players, of ``players`` and of the ``ball``."""
+    done = [match for match in matches if match.error is None]
+    if not done:
+        return {}
+    truth, reach = np.concatenate([match.truth for match in done]), np.concatenate([match.reach for match in done])
+    own = np.concatenate([match.own for match in done])
+    ball = np.zeros((len(own), N_BODIES), np.bool_)
+    ball[:, BALL] = True
+    players = np.concatenate([own, np.zeros((len(own), 1), np.bool_)], axis=1)
+    found: dict[str, dict[str, list[dict[str, Any]]]] = {}
+    for name in done[0].places:
+        sampled = np.concatenate([match.places[name] for match in done])
+        found[name] = {
+            group: [_finite(one) for one in measure(sampled, truth, there, reach)]
+            for group, there in (("players", players), ("ball", ball))
+        }
+    return found
+
+
+def _finite(ahead: Ahead) -> dict[str, Any]:
+    return {name: value if math.isfinite(value) else None for name, value in asdict(ahead).items()}
+
+
+def _cycles_left(match: Logged) -> NDArray[np.int64]:
+    """Return (n_frames,) for how many cycles play_on goes on after each frame."""
+    play = match.frames["playmode"] == PlayMode.PLAY_ON
+    goes_on = follows(match.frames) & play
+    goes_on[:-1] &= play[1:]
+    # The next frame after which it does not go on.
+    ends = np.flatnonzero(~goes_on)
+    place = np.arange(len(play))
+    left: NDArray[np.int64] = ends[np.searchsorted(ends, place)] - place
+    return left
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """Roll-outs of one match; the fields are those of `roll_out`."""
+
+    model: Clone
+    other: Clone | None
+    match: Logged
+    world: World
+    rules: Rules
+    side: int
+    config: RolloutConfig
+    on_cycle: Callable[[], None] | None
+
+    def moved(self, starts: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return (starts, 22) whom the clone moves."""
+        own = np.zeros((len(starts), N_PLAYERS), np.bool_)
+        own[:, slots_of(self.side)] = True
+        own &= self.match.bodies.on_field[starts]
+        if "catch" not in self.model.config.commands:
+            own &= ~self.match.bodies.goalie[starts]
+        return own
+
+    def samples(self, starts: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return (starts, samples, horizon + 1, 23, 2) the clone's samples, with the server's noise."""
+        count = self.config.samples
+        at_once = max(MOST_WORLDS // count, 1)
+        generator = torch.Generator().manual_seed(self.config.seed)
+        rng = np.random.default_rng((self.config.seed, 1))
+        parts = [
+            self._run(np.repeat(starts[begin : begin + at_once], count), point=False, generator=generator, rng=rng)
+            for begin in range(0, len(starts), at_once)
+        ]
+        places = np.concatenate(parts)
+        return places.reshape(len(starts), count, *places.shape[1:])
+
+    def likeliest(self, starts: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return (starts, 1, horizon + 1, 23, 2) where the likeliest commands lead, without noise."""
+        return self._run(starts, point=True, generator=torch.Generator(), rng=None)[:, None]
+
+    def guesses(self, starts: NDArray[np.int64], truth: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
+        """Return the plain guesses: that bodies stand, coast, or go on with their last velocity; the ball rolls on."""
+        scene = self._scene(starts)
+        goes_on = simulate(
+            scene,
+            starts,
+            [GoingOn.of(scene, np.ones(N_PLAYERS, np.bool_))],
+            horizon=self.config.horizon,
+            rng=None,
+        )
+        coast = simulate(self._scene(starts), starts, [], horizon=self.config.horizon, rng=None)
+        return {
+            "stand": np.repeat(truth[:, None, :1], self.config.horizon + 1, axis=2),
+            "coast": np.stack([coast.x, coast.y], axis=-1)[:, None],
+            "last": np.stack([goes_on.x, goes_on.y], axis=-1)[:, None],
+        }
+
+    def _run(
+        self,
+        starts: NDArray[np.int64],
+        *,
+        point: bool,
+        generator: torch.Generator,
+        rng: np.random.Generator | None,
+    ) -> NDArray[np.float32]:
+        scene = self._scene(starts)
+        policies = [
+            *self._others(scene, point=point, generator=generator),
+            Cloned(self.model, self.side, point, generator),
+        ]
+        went = simulate(scene, starts, policies, horizon=self.config.horizon, rng=rng, on_cycle=self.on_cycle)
+        return np.stack([went.x, went.y], axis=-1)
+
+    def _others(self, scene: Scene, *, point: bool, generator: torch.Generator) -> list[Policy]:
+        theirs = np.ones(N_PLAYERS, np.bool_)
+        theirs[slots_of(self.side)] = False
+        if self.config.others == "logged":
+            # A goalkeeper that the clone does not know does as logged, too.
+            if "catch" not in self.model.config.commands:
+                theirs |= self.match.bodies.goalie.any(axis=0)
+            return [AsLogged(self.match, theirs)]
+        if self.config.others == "last":
+            return [GoingOn.of(scene, theirs)]
+        if self.other is None:
+            raise UsageError('others = "clone" needs the clone of the other team')
+        return [Cloned(self.other, -self.side, point, generator)]
+
+    def _scene(self, starts: NDArray[np.int64]) -> Scene:
+        return Scene.of(self.match, self.world, self.rules, starts)

@@ -1,0 +1,64 @@
+"""``simulate``: worlds of a match many cycles ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.dynamics.bodies import N_BODIES
+from teamclone.dynamics.step import step
+from teamclone.rcss.commands import CommandKind
+from teamclone.rollouts.policies import Policy, nothing
+from teamclone.rollouts.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectories:
+    """Places of ball and players over the cycles of roll-outs.
+
+    Attributes:
+        x, y: (n, horizon + 1, 23) float32 metres in the log's frame of reference; the first is the start.
+    """
+
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+
+
+def simulate(
+    scene: Scene,
+    frames: NDArray[np.int64],
+    policies: Sequence[Policy],
+    *,
+    horizon: int,
+    rng: np.random.Generator | None,
+    on_cycle: Callable[[], None] | None = None,
+) -> Trajectories:
+    """Return where ball and players go.
+
+    Args:
+        scene: n worlds at their start. frames: (n,) the frames of the match that they start from; ``horizon`` more
+            follow in the log.
+        policies: who moves the players. Whom none moves stands.
+        horizon: cycles. rng: draws the server's noise; None for its mean.
+        on_cycle: called after each.
+    """
+    n = len(frames)
+    x, y = (np.empty((n, horizon + 1, N_BODIES), np.float32) for _ in range(2))
+    x[:, 0], y[:, 0] = scene.bodies.x, scene.bodies.y
+    for ahead in range(horizon):
+        commands = nothing(n)
+        for policy in policies:
+            policy.command(scene, frames + ahead, commands)
+        bodies = step(scene.bodies, commands, scene.rules, rng)
+        for policy in policies:
+            policy.settle(bodies, frames + ahead + 1)
+        dashed = ~np.isnan(commands.legs[..., 0]).all(axis=-1)
+        executed = np.where(commands.kind == 0, dashed * int(CommandKind.DASH), commands.kind).astype(np.uint8)
+        scene = scene.after(bodies, commands, executed)
+        x[:, ahead + 1], y[:, ahead + 1] = bodies.x, bodies.y
+        if on_cycle is not None:
+            on_cycle()
+    return Trajectories(x=x, y=y)

@@ -1,0 +1,100 @@
+"""Roll-outs as a command: a trained clone, real matches, its files, and its answers to bad input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import teamclone as tc
+from command import teamclone
+from teamclone.training.config import load_config
+
+SETTINGS = (
+    *("model.hidden=[16]", "model.ensemble_size=1", "model.blocks=self,role,ball", "model.kick_blocks=self,ball"),
+    *("model.target_points=2", "model.target_hidden=8", "model.parameter_hidden=16", "model.kick_hidden=8"),
+    *("model.kick_attention=0", "train.epochs=1", "data.batch_size=256", "data.batches_per_epoch=20"),
+    *("train.threads=1", "train.precision=fp32", "train.device=cpu"),
+)
+STARTS, SAMPLES, HORIZON = 4, 3, 5
+SIZE = ("--starts", STARTS, "--samples", SAMPLES, "--horizon", HORIZON)
+
+
+@pytest.fixture(scope="module")
+def log(samples_dir: Path) -> Path:
+    return min(samples_dir.glob("*.rcg.xz"))
+
+
+@pytest.fixture(scope="module")
+def run(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rollout")
+    store = tc.create_store(folder / "store")
+    for path in sorted(samples_dir.glob("*.rcg.xz"))[:4]:
+        store.add(tc.read_match(path))
+    tc.build_dataset(tc.DatasetConfig(teams=("HELIOS_base",)), store=store, out=folder / "dataset", jobs=1)
+    return tc.train(load_config("best", SETTINGS), tc.open_dataset(folder / "dataset"), folder / "run").path
+
+
+def rolled_out(*options: object) -> dict[str, Any]:
+    answer: dict[str, Any] = json.loads(teamclone("rollout", *options, "--json").stdout)
+    return answer
+
+
+def test_its_files(run: Path, log: Path, tmp_path: Path) -> None:
+    document = rolled_out(run, log, *SIZE, "--out", tmp_path, "--trajectories")
+    assert json.loads((tmp_path / "rollouts.json").read_text()) == document
+    assert document["matches"][0]["starts"] == STARTS
+    assert set(document["ahead"]) == {"samples", "likeliest", "stand", "coast", "last"}
+    for group in ("players", "ball"):
+        [one, *_] = document["ahead"]["samples"][group]
+        assert (one["cycles"], one["starts"]) == (1, STARTS)
+        assert one["min_fde"] <= one["fde"]
+    # Whoever stands is further off than a clone after even a short training.
+    after_one = {name: of["players"][0]["fde"] for name, of in document["ahead"].items()}
+    assert after_one["likeliest"] < after_one["stand"]
+    rows = pq.read_table(tmp_path / "trajectories.parquet")
+    assert rows.num_rows == STARTS * (SAMPLES + 5) * (HORIZON + 1) * 23
+    truth = rows.filter(np.array(rows["sample"]) == -1)
+    match = tc.read_match(log)
+    at = truth["frame"].to_numpy() + truth["ahead"].to_numpy()
+    slot = truth["unum"].to_numpy().astype(int) - 1 + np.where(truth["side"].to_numpy() < 0, 11, 0)
+    players = truth["side"].to_numpy() != 0
+    np.testing.assert_array_equal(truth["x"].to_numpy()[players], match.players["x"][at[players], slot[players]])
+    assert (tmp_path / "fans.svg").read_text().count("cycles ahead") == STARTS
+
+
+@pytest.mark.parametrize("others", ["logged", "last", "clone"])
+def test_the_other_team(run: Path, log: Path, tmp_path: Path, others: str) -> None:
+    others = f"clone:{run}" if others == "clone" else others
+    one, again = (rolled_out(run, log, *SIZE, "--others", others, "--out", tmp_path / name) for name in "ab")
+    assert one["ahead"] == again["ahead"]
+    other = rolled_out(run, log, *SIZE, "--others", others, "--out", tmp_path / "c", "--seed", 1)
+    assert one["ahead"] != other["ahead"]
+
+
+def test_one_bad_log_stops_nothing(run: Path, log: Path, fixtures_dir: Path, tmp_path: Path) -> None:
+    old = next((fixtures_dir / "native-v1").glob("*.rcg.gz"))
+    other = next((fixtures_dir / "goalie3").glob("*.rcg.gz"))
+    done = teamclone("rollout", run, old, other, log, *SIZE, "--out", tmp_path, code=1)
+    assert "players: clone, samples" in done.stdout
+    [line] = done.stderr.splitlines()
+    assert f"{old}: expected a log that lists the server's parameters" in line
+    assert "no team 'HELIOS_base'" in line
+    errors = [match["error"] is None for match in json.loads((tmp_path / "rollouts.json").read_text())["matches"]]
+    assert errors == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (("--others", "friends"), "--others 'friends' is unknown, choose one of: logged, last, clone:RUN"),
+        (("--team", "Red", "--side", "left"), "name either a team or a side"),
+        (("--horizon", 0), "Invalid value for '--horizon'"),
+    ],
+)
+def test_wrong_usage(run: Path, log: Path, options: tuple[object, ...], expected: str) -> None:
+    assert expected in teamclone("rollout", run, log, *options, code=2).stderr

@@ -142,7 +142,9 @@ def audit(match: Logged, rules: Rules) -> Audit:
     listed = len(next(iter(rules.types.values())))
     if (match.bodies.type[match.bodies.on_field] >= listed).any():
         raise UsageError(f"expected player types 0 to {listed - 1}, which the log lists, got a player of another")
-    found = residuals(match, rules)
+    # Values that are no numbers are not compared: other checks speak of them.
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        found = residuals(match, rules)
     judge = _Judge(match, rules, found.frame)
     return Audit(
         cycles=len(found.frame),

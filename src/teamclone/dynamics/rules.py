@@ -50,7 +50,8 @@ class Rules:
             version: of rcssserver; None for what the parameters show.
 
         Raises:
-            UsageError: the match has rules that are not computed here: wind, or noise by team.
+            UsageError: the match has rules that are not computed here: wind, or noise by team; or rules that no match
+                can be played by, such as a decay of 1.
         """
         version = server_of.version(params) if version is None else version
         server = {
@@ -62,6 +63,7 @@ class Rules:
         of_type = {name: np.asarray(types[name], np.float64) for name in player_types.FIELDS}
         if version < _KICK_POWER_OF_TYPES and isinstance(params.get("kick_power_rate"), float):
             of_type["kick_power_rate"] = np.full_like(of_type["kick_power_rate"], params["kick_power_rate"])
+        _check(server, of_type)
         return cls(
             server=server,
             types=of_type,
@@ -78,3 +80,35 @@ class Rules:
     def legs(self) -> bool:
         """Whether players dash with two legs, each with a power and a direction of its own."""
         return self.version >= LEGS_SINCE
+
+
+_MOST = 1e7
+"""No parameter of a match is greater."""
+_DECAYS = ("ball_decay", "player_decay")
+_POSITIVE = ("ball_size", "player_size", "kickable_margin", "tackle_dist", "tackle_width", "maxpower", "ball_speed_max")
+
+
+def _check(server: Mapping[str, float], types: Mapping[str, NDArray[np.float64]]) -> None:
+    """Raise unless a match can be played by these parameters.
+
+    Raises:
+        UsageError: it cannot.
+    """
+    for name, values in {**server, **types}.items():
+        given = np.atleast_1d(np.asarray(values, np.float64))
+        low, high, words = -_MOST, _MOST, f"a number within {_MOST:.0e}"
+        if name in _DECAYS:
+            low, high, words = 0.0, np.nextafter(1.0, 0.0), "at least 0 and less than 1"
+        elif name in _POSITIVE:
+            low, words = np.nextafter(0.0, 1.0), f"more than 0 and at most {_MOST:.0e}"
+        # Written so that NaN is wrong.
+        wrong = ~((given >= low) & (given <= high))
+        if wrong.any():
+            raise UsageError(f"expected {name} to be {words}, got {given[wrong][0]:g}")
+    fastest = 100.0 * np.abs(types["dash_power_rate"]).max(initial=0.0)
+    if fastest > _FASTEST_DASH:
+        raise UsageError(f"expected a dash_power_rate of at most {_FASTEST_DASH / 100:g}, got {fastest / 100:g}")
+
+
+_FASTEST_DASH = 10.0
+"""Metres per cycle of a dash with all power: ten times what a server draws."""

@@ -107,9 +107,9 @@ def roll_out(
     logged, world = Logged.of(match), view(match, side=1)
     left = _cycles_left(logged)
     rng = np.random.default_rng(config.seed)
-    possible = np.flatnonzero(left > 0)
+    possible = np.flatnonzero((left > 0) & _is_whole(logged))
     if not len(possible):
-        raise UsageError(f"{path}: expected cycles of play_on, got none")
+        raise UsageError(f"{path}: expected cycles of play_on with all positions, got none")
     starts = np.sort(rng.choice(possible, min(config.starts, len(possible)), replace=False))
     job = _Job(model, other, logged, world, rules, ours, config, on_cycle)
     last = len(left) - 1
@@ -183,6 +183,20 @@ def _cycles_left(match: Logged) -> NDArray[np.int64]:
     place = np.arange(len(play))
     left: NDArray[np.int64] = ends[np.searchsorted(ends, place)] - place
     return left
+
+
+def _is_whole(match: Logged) -> NDArray[np.bool_]:
+    """Return (n_frames,) in which frames ball and players have all their numbers."""
+    bodies = match.bodies
+    places = [bodies.x, bodies.y, bodies.vx, bodies.vy]
+    lacks = ~np.isfinite(np.sum(places, axis=0))
+    lacks[:, :BALL] |= ~np.isfinite(np.sum([getattr(bodies, name) for name in _NUMBERS], axis=0))
+    lacks[:, :BALL] &= bodies.on_field
+    whole: NDArray[np.bool_] = ~lacks.any(axis=1)
+    return whole
+
+
+_NUMBERS = ("body", "neck", "stamina", "effort", "recovery", "capacity")
 
 
 @dataclass(frozen=True, slots=True)

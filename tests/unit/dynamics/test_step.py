@@ -301,6 +301,28 @@ def test_what_is_not_computed_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("ball_decay", 1.0, "expected ball_decay to be at least 0 and less than 1, got 1"),
+        ("player_decay", 1.0, "expected player_decay to be at least 0 and less than 1, got 1"),
+        ("player_decay", np.nan, "got nan"),
+        ("ball_size", 0.0, "expected ball_size to be more than 0 and at most 1e.07, got 0"),
+        ("stamina_max", np.inf, "got inf"),
+        ("dash_power_rate", 1e5, "expected a dash_power_rate of at most 0.1, got 100000"),
+        ("inertia_moment", 1e30, "expected inertia_moment to be a number within 1e"),
+    ],
+)
+def test_rules_that_no_match_is_played_by(name: str, value: float, expected: str) -> None:
+    types, params = dict(TYPES), {}
+    if name in types:
+        types[name] = np.array([value])
+    else:
+        params[name] = value
+    with pytest.raises(UsageError, match=expected):
+        Rules.of(params, types)
+
+
+@pytest.mark.parametrize(
     ("params", "version"),
     [
         ({}, 16),

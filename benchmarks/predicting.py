@@ -17,7 +17,7 @@ import torch
 import teamclone as tc
 from teamclone.dataset.clean import players_to_model
 from teamclone.evaluation.answers import BATCH
-from teamclone.evaluation.prediction_table import KICK_M
+from teamclone.evaluation.prediction_table import near_the_ball
 from teamclone.world.state import State
 
 
@@ -26,7 +26,7 @@ def network_seconds(clone: tc.LoadedClone, match: tc.Match, side: int) -> float:
     model, world = clone.model, tc.view(match, side=side)
     due = players_to_model(match.frames, match.players, side=side, repertoire=clone.commands)
     frame, actor = np.nonzero(due)
-    near = np.hypot(*(world.players[frame, actor, :2] - world.ball[frame, :2]).T) < KICK_M
+    near = near_the_ball(world, frame, actor)
     seconds = 0.0
     with torch.inference_mode():
         for start in range(0, len(frame), BATCH):

@@ -34,7 +34,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "models": (*BASE, "dynamics", "world", "planner"),
     "training": (*BASE, "world", "dataset", "models"),
     "search": (*BASE, "plots", "dataset", "models", "training"),
-    "evaluation": (*BASE, "plots", "logs", "world", "dataset", "models", "training"),
+    "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "dataset", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation"),
     "api": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline"),

@@ -81,6 +81,17 @@ def kickable_area(player_size: Value, kickable_margin: Value, ball_size: Value) 
     return player_size + ball_size + kickable_margin
 
 
+def ball_reach(player_size: Value, kickable_margin: Value, *, server: Any) -> Value:
+    """Return the metres between the centres of player and ball beyond which the player can neither kick nor tackle it.
+
+    Args:
+        server: parameters of the server by name.
+    """
+    kick = kickable_area(player_size, kickable_margin, server["ball_size"])
+    tackle = math.hypot(max(server["tackle_dist"], server["tackle_back_dist"]), server["tackle_width"])
+    return _of(kick).maximum(kick, _like(kick, tackle))
+
+
 def kick_rate(
     distance: Value,
     off_body: Value,

@@ -13,21 +13,24 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from teamclone.dataset.clean import COMMAND_COLUMNS, Commands, clean_match, players_to_model
+from teamclone.dynamics import formulas
 from teamclone.errors import DatasetError, TeamcloneError, UsageError, choose
 from teamclone.evaluation.answers import Answers, answers
 from teamclone.logs.match import Columns, Match
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.playmodes import PlayMode
-from teamclone.world.channels import CHANNEL
+from teamclone.rcss.server_params import FIELDS
+from teamclone.world.channels import CHANNEL, TYPE_FIELD
 from teamclone.world.state import State, Target
 from teamclone.world.view import view_columns
+from teamclone.world.world import World
 
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
 
-KICK_M = 3.0
-"""Kicks and tackles are predicted for players at most this far from the ball; further away the server allows none."""
+_ROUNDING_M = 1e-3
+"""How much further from the ball than a kick or tackle reaches they are still predicted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,8 +174,7 @@ def predict_match(
     world = view_columns(match.frames, match.players, types=match.types, params=match.params, side=side)
     _check(match, world.players, world.ball, frame, model.inputs.channels)
     done = _done(match, frame, actor, side=side, commands=commands, goalkeepers=goalkeepers)
-    me = world.players[frame, actor]
-    near = np.hypot(*(me[:, :2] - world.ball[frame, :2]).T) < KICK_M
+    near = near_the_ball(world, frame, actor)
 
     def state_of(part: slice) -> State:
         return State.of(world, frame[part], actor[part], history=model.inputs.history)
@@ -195,6 +197,16 @@ def predict_match(
     answer = Answers(probabilities, likeliest, parameter_log_loss)
     table = _table(match, frame, actor, answer, done, asked=near | done.with_ball, side=side, commands=commands)
     return PredictionTable(table)
+
+
+def near_the_ball(world: World, frame: NDArray[np.int64], actor: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return (n,) which players could kick or tackle the ball."""
+    me = world.players[frame, actor]
+    types = world.types[me[:, CHANNEL["type"]].astype(np.int64)]
+    size, margin = (types[:, TYPE_FIELD[name]] for name in ("player_size", "kickable_margin"))
+    reach = formulas.ball_reach(size, margin, server=dict(zip(FIELDS, world.server.tolist(), strict=True)))
+    near: NDArray[np.bool_] = np.hypot(*(me[:, :2] - world.ball[frame, :2]).T) < reach + _ROUNDING_M
+    return near
 
 
 def _table(

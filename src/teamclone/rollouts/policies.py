@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from teamclone.dynamics import formulas
 from teamclone.dynamics.bodies import BALL, Bodies, Commands, of_types
 from teamclone.dynamics.logged import Logged
 from teamclone.rcss.commands import CommandKind, parameters_of
@@ -18,8 +19,8 @@ from teamclone.rollouts.scene import Scene, slots_of
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
 
-_REACH_M = 0.1
-"""How much further from the ball than a tackle or kick reaches a clone is asked for them: a little, for rounding."""
+_ROUNDING_M = 1e-3
+"""How much further from the ball than a kick or tackle reaches a clone is asked for them."""
 
 
 class Policy(Protocol):
@@ -144,11 +145,12 @@ def nothing(n: int) -> Commands:
 
 def _near_the_ball(scene: Scene) -> NDArray[np.bool_]:
     """Return (n, 22) who could kick or tackle the ball."""
-    bodies, server = scene.bodies, scene.rules.server
+    bodies, rules = scene.bodies, scene.rules
     dx, dy = (values[:, :BALL] - values[:, BALL:] for values in (bodies.x, bodies.y))
-    kick = of_types(bodies, scene.rules, "player_size") + of_types(bodies, scene.rules, "kickable_margin")
-    tackle = np.hypot(max(server["tackle_dist"], server["tackle_back_dist"]), server["tackle_width"])
-    near: NDArray[np.bool_] = np.hypot(dx, dy) < np.maximum(kick + server["ball_size"], tackle) + _REACH_M
+    reach = formulas.ball_reach(
+        of_types(bodies, rules, "player_size"), of_types(bodies, rules, "kickable_margin"), server=rules.server
+    )
+    near: NDArray[np.bool_] = np.hypot(dx, dy) < reach + _ROUNDING_M
     return near
 
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from teamclone.cli.common import print_table
 from teamclone.dynamics.commands import used_arguments
-from teamclone.dynamics.recover import recover
-from teamclone.dynamics.recovered import Basis, Recovered
+from teamclone.dynamics.inverse.recover import recover
+from teamclone.dynamics.inverse.recovered import Basis, Recovered
 from teamclone.dynamics.rules import Rules
 from teamclone.logs import Match, Severity, find_matches, read_pair
 from teamclone.logs.align import first_body_commands, slot_of

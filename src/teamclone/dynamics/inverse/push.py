@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from teamclone.dynamics import formulas
 from teamclone.dynamics.bodies import BALL
-from teamclone.dynamics.candidates import CONFIDENCE, Candidates
-from teamclone.dynamics.observed import At, Observed
+from teamclone.dynamics.inverse.candidates import CONFIDENCE, Candidates
+from teamclone.dynamics.inverse.observed import At, Observed
 
 _DRAWS = 192
 """Draws of the noise that stand for all."""

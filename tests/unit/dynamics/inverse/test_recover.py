@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from recover import Compared, compare, rows_of
 
 from teamclone.dynamics.bodies import BALL, Bodies, Commands
-from teamclone.dynamics.candidates import Candidates, habits
-from teamclone.dynamics.recover import recover
-from teamclone.dynamics.recovered import Basis, Recovered
+from teamclone.dynamics.inverse.candidates import Candidates, habits
+from teamclone.dynamics.inverse.recover import recover
+from teamclone.dynamics.inverse.recovered import Basis, Recovered
 from teamclone.dynamics.rules import Rules
 from teamclone.dynamics.step import step
 from teamclone.logs import Match, find_matches, read_match, read_pair
@@ -27,7 +27,7 @@ from teamclone.rcss.commands import BODY_KINDS, PARAMETERS, CommandKind
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 DATA = ROOT / "tests" / "data"
 DASH_POWER, DASH_DIRECTION, TURN, KICK_POWER, KICK_DIRECTION, TACKLE = PARAMETERS
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from teamclone.dynamics import formulas
 from teamclone.dynamics.bodies import BALL
 from teamclone.dynamics.contacts import BOUNCE
-from teamclone.dynamics.inverse_dash import dashes
-from teamclone.dynamics.inverse_push import Pushes, kicks, tackles
-from teamclone.dynamics.inverse_turn import neck_turns, turns
+from teamclone.dynamics.inverse.dash import dashes
+from teamclone.dynamics.inverse.observed import RESOLUTION, At, Observed, observe
+from teamclone.dynamics.inverse.push import Pushes, kicks, tackles
+from teamclone.dynamics.inverse.recovered import Basis, Recovered
+from teamclone.dynamics.inverse.turn import neck_turns, turns
 from teamclone.dynamics.logged import rose
-from teamclone.dynamics.observed import RESOLUTION, At, Observed, observe
-from teamclone.dynamics.recovered import Basis, Recovered
 from teamclone.dynamics.rules import Rules
 from teamclone.logs.align import executed_kind, follows
 from teamclone.logs.columns import counter_name

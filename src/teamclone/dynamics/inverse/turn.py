@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.dynamics import formulas
-from teamclone.dynamics.candidates import CONFIDENCE, OF_TWO_ROUNDINGS, Candidates, habits, starts
-from teamclone.dynamics.observed import RESOLUTION as OF_VELOCITY
-from teamclone.dynamics.observed import At, Observed
+from teamclone.dynamics.inverse.candidates import CONFIDENCE, OF_TWO_ROUNDINGS, Candidates, habits, starts
+from teamclone.dynamics.inverse.observed import RESOLUTION as OF_VELOCITY
+from teamclone.dynamics.inverse.observed import At, Observed
 from teamclone.rcss.players import N_TEAM
 
 RESOLUTION = 1e-3

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.dynamics import formulas
-from teamclone.dynamics.candidates import CONFIDENCE, OF_TWO_ROUNDINGS, Candidates, habits, starts
+from teamclone.dynamics.inverse.candidates import CONFIDENCE, OF_TWO_ROUNDINGS, Candidates, habits, starts
+from teamclone.dynamics.inverse.observed import At, Observed
 from teamclone.dynamics.motion import slowness
-from teamclone.dynamics.observed import At, Observed
 from teamclone.rcss.players import N_TEAM
 
 _ALONG, _ALONG_ONE_SIDED = 0.77, 0.61

@@ -47,6 +47,7 @@ demo: install
 	$(BIN)/teamclone train $(DEMO)/dataset --set data.batch_size=512 --set model.extra_kicks=8 --set train.epochs=5 --out $(DEMO)/run
 	$(BIN)/teamclone bench $(DEMO)/run -n 4000
 	$(BIN)/teamclone evaluate $(DEMO)/run
+	$(BIN)/teamclone rollout $(DEMO)/run samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --starts 12 --samples 16 --horizon 30
 	$(BIN)/teamclone report $(DEMO)/run
 
 test: install browser

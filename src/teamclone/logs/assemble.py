@@ -36,6 +36,8 @@ class TeamMark:
 
 MAX_SCORE = 32767
 """The greatest score that its column holds."""
+MAX_CYCLE = 2**31 - 1
+"""The greatest cycle that its column holds."""
 
 
 def stoppage_of(cycle: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -104,6 +106,11 @@ def limited_score(value: float) -> int:
     if math.isnan(value):
         raise ValueError("a score is no number")
     return int(min(max(value, 0), MAX_SCORE))
+
+
+def limited_cycle(digits: bytes) -> int:
+    """Return a cycle limited to its column's range, from as many digits as a damaged log has."""
+    return int(min(float(digits), MAX_CYCLE))
 
 
 def final_teams(marks: Sequence[TeamMark]) -> tuple[Team, Team]:

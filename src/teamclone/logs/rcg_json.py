@@ -280,13 +280,19 @@ def _unum(value: Any) -> int:
     return int(value)
 
 
+def _name(value: Any) -> str | None:
+    if not isinstance(value, str | None):
+        raise ValueError(f"a team is called {value!r}, expected a text")
+    return value
+
+
 def _team_mark(frame: int, body: Record) -> TeamMark:
     teams = {team["side"]: team for team in body["teams"]} if "teams" in body else body
     left, right = teams["l"], teams["r"]
     return TeamMark(
         frame=frame,
-        left=left["name"],
-        right=right["name"],
+        left=_name(left["name"]),
+        right=_name(right["name"]),
         scores=(
             limited_score(left["score"]),
             limited_score(right["score"]),

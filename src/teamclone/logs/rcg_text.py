@@ -16,6 +16,7 @@ from teamclone.logs.assemble import (
     checked_type,
     final_teams,
     frame_columns,
+    limited_cycle,
     limited_score,
     player_type_columns,
 )
@@ -117,14 +118,14 @@ def _unknown_mode(match: re.Match[bytes], *, path: Path | None, line: int) -> Pr
         text=f"play mode {match[2].decode()!r} is unknown, kept as 0",
         path=path,
         line=line,
-        cycle=int(match[1]),
+        cycle=limited_cycle(match[1]),
     )
 
 
 def _team_mark(frame: int, match: re.Match[bytes]) -> TeamMark:
     """Return names and scores of a ``(team ...)`` line, which hold from ``frame`` on."""
     left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
-    scores = [limited_score(int(value or 0)) for value in match.groups()[3:]]
+    scores = [limited_score(float(value or 0)) for value in match.groups()[3:]]
     return TeamMark(
         frame=frame,
         left=left,

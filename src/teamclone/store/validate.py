@@ -99,11 +99,15 @@ def _dead(task: LogPair | tuple[str, str]) -> MatchCheck:
 def _validate_pair(pair: LogPair, *, physics: bool) -> MatchCheck:
     try:
         match = read_pair(pair)
+        compared, findings = _check(convert.tables_of(match), physics=physics)
     except LogError as error:
         return MatchCheck(name=str(pair.path), error=str(error))
     except OSError as error:
         return MatchCheck(name=str(pair.path), error=f"{pair.path}: {error.strerror or error}")
-    compared, findings = _check(convert.tables_of(match), physics=physics)
+    except Exception as error:
+        # A defect here must not cost the other matches.
+        text = f"{pair.path}: could not be checked ({type(error).__name__}: {error}); please report this file"
+        return MatchCheck(name=str(pair.path), error=text)
     return MatchCheck(
         name=str(pair.path),
         match_id=match.match_id,

@@ -19,6 +19,7 @@ from teamclone.logs import Match, read_match
 from teamclone.logs.match import GameLog
 from teamclone.logs.rcl import read_commands
 from teamclone.logs.read import read_game
+from teamclone.store.convert import tables_of
 
 HERE = Path("some.rcg")
 
@@ -228,6 +229,34 @@ def test_a_lone_game_log(rcg_of: Callable[[str], Path], tmp_path: Path):
     match = read_match(path)
     assert [problem.code for problem in match.problems] == ["no-command-log"]
     assert len(match.commands["kind"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("what", "by"),
+    [
+        (rb"\(team 1 HELIOS_base WEBase 0 0\)", b"(team 1 HELIOS_base WEBase " + b"9" * 5000 + b" 0)"),
+        (rb"\(playmode 1 \w+\)", b"(playmode " + b"9" * 5000 + b" nonsense)"),
+        (rb"\(playmode 1 \w+\)", b"(playmode 99999999999 nonsense)"),
+    ],
+)
+def test_numbers_beyond_any_column_are_limited(rcg_of: Callable[[str], Path], tmp_path: Path, what: bytes, by: bytes):
+    data, changed = re.subn(what, by, gzip.decompress(rcg_of("v6").read_bytes()), count=1)
+    assert changed
+    path = tmp_path / "long.rcg"
+    path.write_bytes(data)
+    match = read_match(path)
+    assert len(match.frames["cycle"]) == 199
+    assert {problem.cycle for problem in match.problems} <= {None, 2**31 - 1}
+    assert tables_of(match)["problems"].num_rows == len(match.problems)
+
+
+def test_a_json_log_whose_team_is_called_by_a_number(rcg_of: Callable[[str], Path], tmp_path: Path):
+    data = gzip.decompress(rcg_of("json").read_bytes()).replace(b'"name":"HELIOS_base"', b'"name":5')
+    path = tmp_path / "number.rcg"
+    path.write_bytes(data)
+    match = read_match(path)
+    assert match.left.name is None
+    assert any("a team is called 5, expected a text" in problem.text for problem in match.problems)
 
 
 def test_a_command_log_of_which_most_was_refused_is_kept(rcg_of: Callable[[str], Path]):

@@ -61,8 +61,8 @@ class LogPair:
 def find_matches(paths: Iterable[Path]) -> list[LogPair]:
     """Return the matches in files and folders (searched recursively), each once, ordered by path.
 
-    Files are paired by name: ``x.rcg.gz`` goes with ``x.rcl`` in any packing. A file named on its own is taken
-    whatever it is called.
+    Files are paired by name: ``x.rcg.gz`` goes with ``x.rcl`` in any packing. In folders the ``._`` files that macOS
+    keeps beside others are passed over. A file named on its own is taken whatever it is called.
 
     Raises:
         UsageError: a path does not exist, or there is no log under any of them.
@@ -71,7 +71,7 @@ def find_matches(paths: Iterable[Path]) -> list[LogPair]:
     given = list(paths)
     for path in given:
         if path.is_dir():
-            files = sorted(file for file in path.rglob("*") if _LOG_NAME.match(file.name) and file.is_file())
+            files = sorted(file for file in path.rglob("*") if _is_log_name(file.name) and file.is_file())
         elif path.exists():
             files = [path]
         else:
@@ -90,6 +90,10 @@ def find_matches(paths: Iterable[Path]) -> list[LogPair]:
     if not found:
         raise UsageError(f"no .rcg or .rcl file under {', '.join(map(str, given)) or 'no path'}")
     return [LogPair(rcg=pair.get("rcg"), rcl=pair.get("rcl")) for _, pair in sorted(found.items())]
+
+
+def _is_log_name(name: str) -> bool:
+    return _LOG_NAME.match(name) is not None and not name.startswith("._")
 
 
 def partner_of(path: Path) -> Path | None:

@@ -230,9 +230,9 @@ CHECKS = (
     ),
     Query(
         name="command-numbers",
-        about="commands that the server takes have their numbers",
+        about="commands of players that the server takes have their numbers",
         sql=_commands(
-            "valid and legs = 0 and ("
+            "valid and unum > 0 and legs = 0 and ("
             + " or ".join(
                 f"(kind = {int(kind)} and ({' or '.join(f'arg{place} is null' for place in range(count))}))"
                 for kind, count in _NUMBERS.items()

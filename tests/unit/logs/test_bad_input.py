@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from teamclone.errors import LogError
-from teamclone.logs import Match, read_match
+from teamclone.logs import Match, find_matches, read_match
 from teamclone.logs.match import GameLog
 from teamclone.logs.rcl import read_commands
 from teamclone.logs.read import read_game
@@ -188,6 +188,13 @@ def test_foreign_files_are_refused_in_one_line(tmp_path: Path, content: bytes):
         read_match(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_the_files_of_macos_beside_logs_are_passed_over(rcg_of: Callable[[str], Path], tmp_path: Path):
+    log = rcg_of("v6")
+    (tmp_path / log.name).write_bytes(log.read_bytes())
+    (tmp_path / f"._{log.name}").write_bytes(b"\0\5\x16\7")
+    assert [pair.path.name for pair in find_matches([tmp_path])] == [log.name]
 
 
 def test_missing_files_and_folders(tmp_path: Path):

@@ -97,3 +97,11 @@ def test_a_finding_says_where(tables: Tables) -> None:
 def test_players_off_the_field_may_be_anywhere(tables: Tables) -> None:
     away = change(tables, "player_states", "state", player(3), 0)
     assert check_match(change(away, "player_states", "x", player(3), -60.0)) == []
+
+
+def test_a_move_of_the_trainer_has_no_numbers_of_a_player(tables: Tables) -> None:
+    """It names what it moves first, ``(move (ball) -20 20)``, and its arguments are not read."""
+    row = command_of(tables, CommandKind.DASH)
+    for column, value in (("side", 0), ("unum", 0), ("kind", int(CommandKind.MOVE)), ("arg0", None), ("arg1", None)):
+        tables = change(tables, "commands", column, row, value)
+    assert "command-numbers" not in {finding.check.name for finding in check_match(tables)}

@@ -627,6 +627,10 @@ def _kind_of(buffer: Bytes, start: int, stop: int) -> int:
     return kind
 
 
+_SAYABLE = np.zeros(256, np.bool_)
+"""Whether the server's lexer takes a byte in a quoted message (player_command_tok.lpp)."""
+_SAYABLE[np.frombuffer(b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz ().+*/?<>_-", np.uint8)] = True
+
 _FLAGS = (b"on", b"off", b"true", b"false")
 _WIDTHS = (b"narrow", b"normal", b"wide")
 _QUALITIES = (b"high", b"low")
@@ -817,6 +821,8 @@ def _scan_command(
     if kind == _SAY and end - begin >= 2 and _byte(buffer, begin) == 34 and _byte(buffer, end - 1) == 34:
         begin += 1
         end -= 1
+        for position in range(begin, end if of_player else begin):
+            fine = fine and _SAYABLE[np.uintp(_byte(buffer, position))]
     most = _MOST[kind]
     if of_player and most >= 0:
         if kind == _DASH and begin < end and _byte(buffer, begin) == 40:

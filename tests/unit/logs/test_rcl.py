@@ -55,6 +55,11 @@ def test_every_command_of_a_message():
         ("(kick 61.5 -20)", ("kick", True, (61.5, -20.0), 0, "")),
         ("(turn +1e1)", ("turn", True, (10.0,), 0, "")),
         ("(turn .5)", ("turn", True, (0.5,), 0, "")),
+        # Without a point it is an int of 32 bits, which wraps.
+        ("(turn 4294967386)", ("turn", True, (90.0,), 0, "")),
+        ("(turn 3000000000)", ("turn", True, (-1294967296.0,), 0, "")),
+        ("(turn 99999999999999999999)", ("turn", True, (-1.0,), 0, "")),
+        ("(turn 4294967386.0)", ("turn", True, (float(np.float32(4294967386.0)),), 0, "")),
         ("( turn  10 )", ("turn", True, (10.0,), 0, "")),
         ("(tackle 30)", ("tackle", True, (30.0,), 0, "")),
         ("(tackle 30 maybe)", ("tackle", False, (), 0, "30 maybe")),
@@ -109,6 +114,11 @@ def test_a_mistake_ends_a_message_but_not_what_stands_before_it():
         ("turn", True),
         ("illegal", False),
         ("turn", False),
+    ]
+    assert [(kind, valid) for kind, valid, *_ in commands_of('(turn 10)(say "at:3")(dash 60)')] == [
+        ("turn", True),
+        ("say", False),
+        ("dash", False),
     ]
 
 

@@ -821,8 +821,8 @@ def _scan_command(
     if kind == _SAY and end - begin >= 2 and _byte(buffer, begin) == 34 and _byte(buffer, end - 1) == 34:
         begin += 1
         end -= 1
-        for position in range(begin, end if of_player else begin):
-            fine = fine and _SAYABLE[np.uintp(_byte(buffer, position))]
+        for place in range(begin, end if of_player else begin):
+            fine = fine and _SAYABLE[np.uintp(_byte(buffer, place))]
     most = _MOST[kind]
     if of_player and most >= 0:
         if kind == _DASH and begin < end and _byte(buffer, begin) == 40:

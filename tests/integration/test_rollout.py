@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import lzma
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +87,26 @@ def test_one_bad_log_stops_nothing(run: Path, log: Path, fixtures_dir: Path, tmp
     assert f"{old}: expected a log that lists the server's parameters" in line
     assert "no team 'HELIOS_base'" in line
     errors = [match["error"] is None for match in json.loads((tmp_path / "rollouts.json").read_text())["matches"]]
-    assert errors == [False, False, True]
+    assert sorted(errors) == [False, False, True]
+
+
+def test_a_folder_of_game_logs_alone(run: Path, log: Path, tmp_path: Path) -> None:
+    """The kicks of the other team are then those that the movements show."""
+    (tmp_path / "logs").mkdir()
+    shutil.copy(log, tmp_path / "logs")
+    size = ("--starts", 30, "--samples", 2, "--horizon", 3)
+    document = rolled_out(run, tmp_path / "logs", *size, "--out", tmp_path / "out", "--side", "right", "--trajectories")
+    assert document["team"] is None
+    assert [row["cycles"] for row in document["ahead"]["samples"]["ball"]] == [1, 2, 3]
+    rolled_out(run, tmp_path / "logs", *size, "--out", tmp_path / "out", "--side", "right")
+    assert not (tmp_path / "out" / "trajectories.parquet").exists()
+
+
+def test_a_log_without_player_types(run: Path, log: Path, tmp_path: Path) -> None:
+    lines = lzma.decompress(log.read_bytes()).splitlines(keepends=True)
+    (tmp_path / "bare.rcg").write_bytes(b"".join(line for line in lines if not line.startswith(b"(player_type ")))
+    done = teamclone("rollout", run, tmp_path / "bare.rcg", *SIZE, "--out", tmp_path / "out", code=1)
+    assert "expected a log that lists player types, got one without" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,9 @@ _WHO = {
 
 def rollout(
     run: Annotated[Path, typer.Argument(help="Run folder made by `teamclone train`.")],
-    logs: Annotated[list[Path], typer.Argument(help="Game logs; command logs are found beside them.")],
+    logs: Annotated[
+        list[Path], typer.Argument(help="Game logs, or folders of logs; command logs are found beside them.")
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder to write; RUN/rollouts unless given.")] = None,
     team: Annotated[
         str | None, typer.Option(help="The clone plays this team; the one it was trained on unless given.")
@@ -42,6 +44,7 @@ def rollout(
 ) -> None:
     """Play a clone many cycles ahead from frames of matches. Exit code 1 if a log failed."""
     from teamclone.errors import UsageError
+    from teamclone.logs import find_matches
     from teamclone.rollouts.files import write_rollouts
     from teamclone.rollouts.run import RolloutConfig, in_matches
     from teamclone.training.run import open_run
@@ -63,7 +66,7 @@ def rollout(
 
         found = in_matches(
             model,
-            logs,
+            [pair.rcg for pair in find_matches(logs) if pair.rcg is not None],
             config,
             team=(team or opened.team) if side is None else None,
             side=side,
@@ -71,7 +74,8 @@ def rollout(
             on_match=on_match,
         )
     out = out or run / "rollouts"
-    about = {"run": str(run), "checkpoint": checkpoint, "team": team or opened.team, "others": others}
+    plays = None if side is not None else team or opened.team
+    about = {"run": str(run), "checkpoint": checkpoint, "team": plays, "others": others}
     document = write_rollouts(out, found, config, about, trajectories=trajectories)
     if as_json:
         print_json(document)
@@ -80,7 +84,7 @@ def rollout(
         print(f"Wrote {out}")
     failed = [match for match in found if match.error is not None]
     if failed:
-        fail("; ".join(f"{match.path}: {match.error}" for match in failed), code=1)
+        fail("; ".join(str(match.error) for match in failed), code=1)
 
 
 def _table(ahead: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
@@ -91,5 +95,7 @@ def _table(ahead: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
     for group in ("players", "ball"):
         for name, who in _WHO.items():
             found = {row["cycles"]: row["fde"] for row in ahead[name][group]}
-            rows.append([f"{group}: {who}", *(f"{found[one]:.2f}" if one in found else "" for one in cycles)])
+            rows.append(
+                [f"{group}: {who}", *(f"{found[one]:.2f}" if found.get(one) is not None else "" for one in cycles)]
+            )
     return headers, rows

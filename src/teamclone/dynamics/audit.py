@@ -100,7 +100,7 @@ LAWS = {
 MISSING_FRAMES = Law(
     name="physics-frames",
     about="every cycle has its frame",
-    off="{:.0f} cycles have none",
+    off="cycles without a frame: {:.0f}",
     parameters="",
 )
 
@@ -139,9 +139,7 @@ def audit(match: Logged, rules: Rules) -> Audit:
     """
     if np.isnan(match.bodies.vx[match.bodies.mode != 0][:, BALL]).any():
         raise UsageError("expected a game log of version 3 or later, got one without velocities")
-    listed = len(next(iter(rules.types.values())))
-    if (match.bodies.type[match.bodies.on_field] >= listed).any():
-        raise UsageError(f"expected player types 0 to {listed - 1}, which the log lists, got a player of another")
+    need_types(match, rules)
     # Values that are no numbers are not compared: other checks speak of them.
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         found = residuals(match, rules)
@@ -155,6 +153,19 @@ def audit(match: Logged, rules: Rules) -> Audit:
             *(deviation for name, residual in found.of.items() for deviation in judge.deviations(name, residual)),
         ),
     )
+
+
+def need_types(match: Logged, rules: Rules) -> None:
+    """Raise unless the rules list the types of all players.
+
+    Raises:
+        UsageError: they do not.
+    """
+    listed = len(next(iter(rules.types.values())))
+    if not listed:
+        raise UsageError("expected a log that lists player types, got one without")
+    if (match.bodies.type[match.bodies.on_field] >= listed).any():
+        raise UsageError(f"expected player types 0 to {listed - 1}, which the log lists, got a player of another")
 
 
 def rules_of(params: Mapping[str, float | str], types: Columns) -> Rules:

@@ -54,6 +54,9 @@ class Rules:
                 can be played by, such as a decay of 1.
         """
         version = server_of.version(params) if version is None else version
+        for name in (*server_of.DEFAULTS, *server_of.FURTHER):
+            if not isinstance(params.get(name, 0.0), int | float):
+                raise UsageError(f"expected {name} to be a number, got {params[name]!r}")
         server = {
             name: server_of.number(params, name, version=version) for name in (*server_of.DEFAULTS, *server_of.FURTHER)
         }
@@ -85,7 +88,16 @@ class Rules:
 _MOST = 1e7
 """No parameter of a match is greater."""
 _DECAYS = ("ball_decay", "player_decay")
-_POSITIVE = ("ball_size", "player_size", "kickable_margin", "tackle_dist", "tackle_width", "maxpower", "ball_speed_max")
+_POSITIVE = (
+    "ball_size",
+    "player_size",
+    "kickable_margin",
+    "tackle_dist",
+    "tackle_width",
+    "maxpower",
+    "ball_speed_max",
+    "simulator_step",
+)
 
 
 def _check(server: Mapping[str, float], types: Mapping[str, NDArray[np.float64]]) -> None:
@@ -98,7 +110,7 @@ def _check(server: Mapping[str, float], types: Mapping[str, NDArray[np.float64]]
         given = np.atleast_1d(np.asarray(values, np.float64))
         low, high, words = -_MOST, _MOST, f"a number within {_MOST:.0e}"
         if name in _DECAYS:
-            low, high, words = 0.0, np.nextafter(1.0, 0.0), "at least 0 and less than 1"
+            low, high, words = np.nextafter(0.0, 1.0), np.nextafter(1.0, 0.0), "more than 0 and less than 1"
         elif name in _POSITIVE:
             low, words = np.nextafter(0.0, 1.0), f"more than 0 and at most {_MOST:.0e}"
         # Written so that NaN is wrong.

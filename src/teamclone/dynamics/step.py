@@ -54,6 +54,8 @@ def step(
     Raises:
         IndexError: a player has a type that the rules do not list.
     """
+    if (bodies.type < 0).any():
+        raise IndexError("a player has a negative type")
     bodies, caught = receive(bodies, commands, rules, rng=rng, succeeded=succeeded)
     motion = set_off(bodies, commands, rules, caught=caught, rng=rng, succeeded=succeeded)
     return hold(_moved(bodies, motion, rules, rng), caught, rules)

@@ -56,6 +56,9 @@ def write_rollouts(
         "ahead": figures(matches),
     }
     write_document(out / "rollouts.json", document)
+    # Those of an earlier call are of other roll-outs.
+    for name in ("fans.svg", "trajectories.parquet"):
+        (out / name).unlink(missing_ok=True)
     done = [match for match in matches if match.error is None]
     if done:
         write_atomic(out / "fans.svg", _fans(done))

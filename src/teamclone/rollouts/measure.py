@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 HORIZONS = (1, 2, 5, 10, 20, 30, 50, 75, 100)
-"""Cycles ahead that are shown; those up to the horizon of a roll-out."""
+"""Cycles ahead that are shown, those up to the horizon of a roll-out, and the horizon itself."""
 INTERVAL = 0.9
 """Share of the samples that an interval of a coordinate holds, between quantiles of both ends."""
 
@@ -49,7 +49,7 @@ def measure(
     """
     horizon = truth.shape[1] - 1
     found = []
-    for ahead in (cycles for cycles in HORIZONS if cycles <= horizon):
+    for ahead in sorted({*(cycles for cycles in HORIZONS if cycles <= horizon), horizon}):
         rows = (reach >= ahead) & there.any(axis=1)
         if rows.any():
             found.append(_ahead(sampled[rows], truth[rows], there[rows], ahead))

@@ -96,6 +96,10 @@ class AsLogged:
         logged = self.match.commands.select(self._there(frames))
         for name in ("kind", "numbers", "legs", "foul", "turn_neck"):
             getattr(commands, name)[:, self.slots] = getattr(logged, name)[:, self.slots]
+        # A command of which nothing is known but that it was given does nothing.
+        unknown = np.isnan(commands.numbers[..., 0]) & (commands.kind > 0)
+        commands.kind[unknown & self.slots] = 0
+        commands.turn_neck[np.isnan(commands.turn_neck)] = 0.0
 
     def settle(self, bodies: Bodies, frames: NDArray[np.int64]) -> None:
         """Put the players where the log has them."""

@@ -12,14 +12,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from teamclone.dynamics.audit import rules_of
+from teamclone.dynamics.audit import need_types, rules_of
 from teamclone.dynamics.bodies import BALL, N_BODIES
+from teamclone.dynamics.inverse.recover import recover
 from teamclone.dynamics.logged import Logged
 from teamclone.dynamics.rules import Rules
 from teamclone.errors import TeamcloneError, UsageError
 from teamclone.evaluation.prediction_table import MatchColumns
 from teamclone.logs import read_match
 from teamclone.logs.align import follows
+from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.rollouts.measure import Ahead, measure
@@ -105,6 +107,9 @@ def roll_out(
     ours = MatchColumns.of(match).side_of(team, side)
     rules = rules_of(match.game.server_params, match.game.player_types)
     logged, world = Logged.of(match), view(match, side=1)
+    need_types(logged, rules)
+    if match.log is None:
+        _recover_pushes(logged, rules)
     left = _cycles_left(logged)
     rng = np.random.default_rng(config.seed)
     possible = np.flatnonzero((left > 0) & _is_whole(logged))
@@ -145,7 +150,8 @@ def in_matches(
             on_cycle = None if on_match is None else on_match(path)
             found.append(roll_out(model, path, config, team=team, side=side, other=other, on_cycle=on_cycle))
         except (TeamcloneError, OSError) as error:
-            found.append(MatchRollouts(path=path, error=str(error)))
+            text = str(error)
+            found.append(MatchRollouts(path=path, error=text if str(path) in text else f"{path}: {text}"))
     return found
 
 
@@ -183,6 +189,13 @@ def _cycles_left(match: Logged) -> NDArray[np.int64]:
     place = np.arange(len(play))
     left: NDArray[np.int64] = ends[np.searchsorted(ends, place)] - place
     return left
+
+
+def _recover_pushes(match: Logged, rules: Rules) -> None:
+    """Fill in, in place, the numbers of kicks and tackles that only a command log would state."""
+    found = recover(match.frames, match.players, rules)
+    rows = np.isin(found.kind, (CommandKind.KICK, CommandKind.TACKLE)) & ~np.isnan(found.value[:, 0])
+    match.commands.numbers[found.frame[rows], found.slot[rows]] = found.value[rows]
 
 
 def _is_whole(match: Logged) -> NDArray[np.bool_]:

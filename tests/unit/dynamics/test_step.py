@@ -294,8 +294,9 @@ def test_cycles_of_a_batch_are_independent() -> None:
 
 
 def test_what_is_not_computed_is_refused() -> None:
-    with pytest.raises(IndexError):
-        step(put(at_rest(), 3, type=1), nobody(), RULES)
+    for unlisted in (1, -1):
+        with pytest.raises(IndexError):
+            step(put(at_rest(), 3, type=unlisted), nobody(), RULES)
     with pytest.raises(UsageError, match="wind_rand = 0"):
         Rules.of({"wind_rand": 0.1}, TYPES)
 
@@ -303,17 +304,21 @@ def test_what_is_not_computed_is_refused() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("ball_decay", 1.0, "expected ball_decay to be at least 0 and less than 1, got 1"),
-        ("player_decay", 1.0, "expected player_decay to be at least 0 and less than 1, got 1"),
+        ("ball_decay", 1.0, "expected ball_decay to be more than 0 and less than 1, got 1"),
+        ("player_decay", 1.0, "expected player_decay to be more than 0 and less than 1, got 1"),
         ("player_decay", np.nan, "got nan"),
+        ("player_decay", 0.0, "expected player_decay to be more than 0 and less than 1, got 0"),
+        ("simulator_step", 0.0, "expected simulator_step to be more than 0 and at most 1e.07, got 0"),
+        ("ball_decay", "x", "expected ball_decay to be a number, got 'x'"),
         ("ball_size", 0.0, "expected ball_size to be more than 0 and at most 1e.07, got 0"),
         ("stamina_max", np.inf, "got inf"),
         ("dash_power_rate", 1e5, "expected a dash_power_rate of at most 0.1, got 100000"),
         ("inertia_moment", 1e30, "expected inertia_moment to be a number within 1e"),
     ],
 )
-def test_rules_that_no_match_is_played_by(name: str, value: float, expected: str) -> None:
-    types, params = dict(TYPES), {}
+def test_rules_that_no_match_is_played_by(name: str, value: Any, expected: str) -> None:
+    types: dict[str, Any] = dict(TYPES)
+    params: dict[str, Any] = {}
     if name in types:
         types[name] = np.array([value])
     else:

@@ -22,7 +22,7 @@ class Ahead:
         fde: final displacement error: distance of a sample's end from the true one, the mean over samples and bodies.
         ade: the same along the way, the mean over its cycles (average displacement error).
         mean_fde: distance of the samples' mean from the truth.
-        min_fde, min_ade: of the best sample of each start, its bodies together: one sample for the whole scene.
+        min_fde, min_ade: of the best sample of each start, its bodies together: one sample for all of them.
         coverage: share of true coordinates within the `INTERVAL` of the samples. crps: continuous ranked probability
             score of a coordinate, metres. Both NaN with a single sample.
     """
@@ -61,7 +61,7 @@ def _ahead(sampled: NDArray[np.floating], truth: NDArray[np.floating], there: ND
     distance = np.linalg.norm(off, axis=-1)
     # Means over the bodies of a start, (starts, samples, ahead): each start has the same weight.
     weight = there / there.sum(axis=1, keepdims=True)
-    scene = np.einsum("skhb,sb->skh", distance, weight)
+    of_start = np.einsum("skhb,sb->skh", distance, weight)
     mean = np.linalg.norm(off[:, :, -1].mean(axis=1), axis=-1)
     last, true = sampled[:, :, ahead].astype(np.float64), truth[:, ahead].astype(np.float64)
     coverage = crps = float("nan")
@@ -72,11 +72,11 @@ def _ahead(sampled: NDArray[np.floating], truth: NDArray[np.floating], there: ND
     return Ahead(
         cycles=ahead,
         starts=len(truth),
-        fde=float(scene[..., -1].mean()),
-        ade=float(scene.mean()),
+        fde=float(of_start[..., -1].mean()),
+        ade=float(of_start.mean()),
         mean_fde=float((mean * weight).sum(axis=1).mean()),
-        min_fde=float(scene[..., -1].min(axis=1).mean()),
-        min_ade=float(scene.mean(axis=-1).min(axis=1).mean()),
+        min_fde=float(of_start[..., -1].min(axis=1).mean()),
+        min_ade=float(of_start.mean(axis=-1).min(axis=1).mean()),
         coverage=coverage,
         crps=crps,
     )

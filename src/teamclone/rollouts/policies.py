@@ -14,7 +14,7 @@ from teamclone.dynamics.bodies import BALL, Bodies, Commands, of_types
 from teamclone.dynamics.logged import Logged
 from teamclone.rcss.commands import CommandKind, parameters_of
 from teamclone.rcss.players import N_TEAM
-from teamclone.rollouts.scene import Scene, slots_of
+from teamclone.rollouts.worlds import Worlds, slots_of
 
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
@@ -26,7 +26,7 @@ _ROUNDING_M = 1e-3
 class Policy(Protocol):
     """What moves a team. ``frames`` (n,) are the frames of the match in which the worlds would be now."""
 
-    def command(self, scene: Scene, frames: NDArray[np.int64], commands: Commands) -> None:
+    def command(self, worlds: Worlds, frames: NDArray[np.int64], commands: Commands) -> None:
         """Write the commands of the team's players into ``commands``."""
 
     def settle(self, bodies: Bodies, frames: NDArray[np.int64]) -> None:
@@ -47,17 +47,17 @@ class Cloned:
     point: bool
     generator: torch.Generator
 
-    def command(self, scene: Scene, frames: NDArray[np.int64], commands: Commands) -> None:
+    def command(self, worlds: Worlds, frames: NDArray[np.int64], commands: Commands) -> None:
         """Write what the clone does; see `Policy`."""
-        own, bodies = slots_of(self.side), scene.bodies
+        own, bodies = slots_of(self.side), worlds.bodies
         due = bodies.on_field[:, own] & (bodies.frozen[:, own] == 0)
         if "catch" not in self.model.config.commands:
             due &= ~bodies.goalie[:, own]
         world, actor = np.nonzero(due)
         if not len(world):
             return
-        state = scene.state(world, actor, side=self.side)
-        near = torch.from_numpy(np.flatnonzero(_near_the_ball(scene)[:, own][due]))
+        state = worlds.state(world, actor, side=self.side)
+        near = torch.from_numpy(np.flatnonzero(_near_the_ball(worlds)[:, own][due]))
         with torch.inference_mode():
             answer = self.model.answer(state, kick_rows=near)
             if self.point:
@@ -91,7 +91,7 @@ class AsLogged:
     match: Logged
     slots: NDArray[np.bool_]
 
-    def command(self, scene: Scene, frames: NDArray[np.int64], commands: Commands) -> None:
+    def command(self, worlds: Worlds, frames: NDArray[np.int64], commands: Commands) -> None:
         """Write the commands of the log; see `Policy`."""
         logged = self.match.commands.select(self._there(frames))
         for name in ("kind", "numbers", "legs", "foul", "turn_neck"):
@@ -125,15 +125,15 @@ class GoingOn:
     vy: NDArray[np.float64]
 
     @classmethod
-    def of(cls, scene: Scene, slots: NDArray[np.bool_]) -> GoingOn:
-        """Return the policy for the velocities of a scene."""
-        decay = of_types(scene.bodies, scene.rules, "player_decay")
-        return cls(slots, scene.bodies.vx[:, :BALL] / decay, scene.bodies.vy[:, :BALL] / decay)
+    def of(cls, worlds: Worlds, slots: NDArray[np.bool_]) -> GoingOn:
+        """Return the policy for the velocities of some worlds."""
+        decay = of_types(worlds.bodies, worlds.rules, "player_decay")
+        return cls(slots, worlds.bodies.vx[:, :BALL] / decay, worlds.bodies.vy[:, :BALL] / decay)
 
-    def command(self, scene: Scene, frames: NDArray[np.int64], commands: Commands) -> None:
+    def command(self, worlds: Worlds, frames: NDArray[np.int64], commands: Commands) -> None:
         """Give the players the velocity again that decay takes; see `Policy`."""
         for name, velocity in (("vx", self.vx), ("vy", self.vy)):
-            getattr(scene.bodies, name)[:, :BALL][:, self.slots] = velocity[:, self.slots]
+            getattr(worlds.bodies, name)[:, :BALL][:, self.slots] = velocity[:, self.slots]
 
     def settle(self, bodies: Bodies, frames: NDArray[np.int64]) -> None:
         """Leave the players where the step has put them."""
@@ -147,9 +147,9 @@ def nothing(n: int) -> Commands:
     return Commands.of(np.zeros((n, BALL), np.uint8), np.full((n, BALL, 2), np.nan))
 
 
-def _near_the_ball(scene: Scene) -> NDArray[np.bool_]:
+def _near_the_ball(worlds: Worlds) -> NDArray[np.bool_]:
     """Return (n, 22) who could kick or tackle the ball."""
-    bodies, rules = scene.bodies, scene.rules
+    bodies, rules = worlds.bodies, worlds.rules
     dx, dy = (values[:, :BALL] - values[:, BALL:] for values in (bodies.x, bodies.y))
     reach = formulas.ball_reach(
         of_types(bodies, rules, "player_size"), of_types(bodies, rules, "kickable_margin"), server=rules.server

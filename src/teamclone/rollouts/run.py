@@ -26,8 +26,8 @@ from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.rollouts.measure import Ahead, measure
 from teamclone.rollouts.policies import AsLogged, Cloned, GoingOn, Policy
-from teamclone.rollouts.scene import Scene, slots_of
 from teamclone.rollouts.simulate import simulate
+from teamclone.rollouts.worlds import Worlds, slots_of
 from teamclone.world.view import view
 from teamclone.world.world import World
 
@@ -253,15 +253,15 @@ class _Job:
 
     def guesses(self, starts: NDArray[np.int64], truth: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
         """Return the plain guesses: that bodies stand, coast, or go on with their last velocity; the ball rolls on."""
-        scene = self._scene(starts)
+        worlds = self._worlds(starts)
         goes_on = simulate(
-            scene,
+            worlds,
             starts,
-            [GoingOn.of(scene, np.ones(N_PLAYERS, np.bool_))],
+            [GoingOn.of(worlds, np.ones(N_PLAYERS, np.bool_))],
             horizon=self.config.horizon,
             rng=None,
         )
-        coast = simulate(self._scene(starts), starts, [], horizon=self.config.horizon, rng=None)
+        coast = simulate(self._worlds(starts), starts, [], horizon=self.config.horizon, rng=None)
         return {
             "stand": np.repeat(truth[:, None, :1], self.config.horizon + 1, axis=2),
             "coast": np.stack([coast.x, coast.y], axis=-1)[:, None],
@@ -276,15 +276,15 @@ class _Job:
         generator: torch.Generator,
         rng: np.random.Generator | None,
     ) -> NDArray[np.float32]:
-        scene = self._scene(starts)
+        worlds = self._worlds(starts)
         policies = [
-            *self._others(scene, point=point, generator=generator),
+            *self._others(worlds, point=point, generator=generator),
             Cloned(self.model, self.side, point, generator),
         ]
-        went = simulate(scene, starts, policies, horizon=self.config.horizon, rng=rng, on_cycle=self.on_cycle)
+        went = simulate(worlds, starts, policies, horizon=self.config.horizon, rng=rng, on_cycle=self.on_cycle)
         return np.stack([went.x, went.y], axis=-1)
 
-    def _others(self, scene: Scene, *, point: bool, generator: torch.Generator) -> list[Policy]:
+    def _others(self, worlds: Worlds, *, point: bool, generator: torch.Generator) -> list[Policy]:
         theirs = np.ones(N_PLAYERS, np.bool_)
         theirs[slots_of(self.side)] = False
         if self.config.others == "logged":
@@ -293,10 +293,10 @@ class _Job:
                 theirs |= self.match.bodies.goalie.any(axis=0)
             return [AsLogged(self.match, theirs)]
         if self.config.others == "last":
-            return [GoingOn.of(scene, theirs)]
+            return [GoingOn.of(worlds, theirs)]
         if self.other is None:
             raise UsageError('others = "clone" needs the clone of the other team')
         return [Cloned(self.other, -self.side, point, generator)]
 
-    def _scene(self, starts: NDArray[np.int64]) -> Scene:
-        return Scene.of(self.match, self.world, self.rules, starts)
+    def _worlds(self, starts: NDArray[np.int64]) -> Worlds:
+        return Worlds.of(self.match, self.world, self.rules, starts)

@@ -12,7 +12,7 @@ from teamclone.dynamics.bodies import N_BODIES
 from teamclone.dynamics.step import step
 from teamclone.rcss.commands import CommandKind
 from teamclone.rollouts.policies import Policy, nothing
-from teamclone.rollouts.scene import Scene
+from teamclone.rollouts.worlds import Worlds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class Trajectories:
 
 
 def simulate(
-    scene: Scene,
+    worlds: Worlds,
     frames: NDArray[np.int64],
     policies: Sequence[Policy],
     *,
@@ -39,7 +39,7 @@ def simulate(
     """Return where ball and players go.
 
     Args:
-        scene: n worlds at their start. frames: (n,) the frames of the match that they start from; ``horizon`` more
+        worlds: n worlds at their start. frames: (n,) the frames of the match that they start from; ``horizon`` more
             follow in the log.
         policies: who moves the players. Whom none moves stands.
         horizon: cycles. rng: draws the server's noise; None for its mean.
@@ -47,17 +47,17 @@ def simulate(
     """
     n = len(frames)
     x, y = (np.empty((n, horizon + 1, N_BODIES), np.float32) for _ in range(2))
-    x[:, 0], y[:, 0] = scene.bodies.x, scene.bodies.y
+    x[:, 0], y[:, 0] = worlds.bodies.x, worlds.bodies.y
     for ahead in range(horizon):
         commands = nothing(n)
         for policy in policies:
-            policy.command(scene, frames + ahead, commands)
-        bodies = step(scene.bodies, commands, scene.rules, rng)
+            policy.command(worlds, frames + ahead, commands)
+        bodies = step(worlds.bodies, commands, worlds.rules, rng)
         for policy in policies:
             policy.settle(bodies, frames + ahead + 1)
         dashed = ~np.isnan(commands.legs[..., 0]).all(axis=-1)
         executed = np.where(commands.kind == 0, dashed * int(CommandKind.DASH), commands.kind).astype(np.uint8)
-        scene = scene.after(bodies, commands, executed)
+        worlds = worlds.after(bodies, commands, executed)
         x[:, ahead + 1], y[:, ahead + 1] = bodies.x, bodies.y
         if on_cycle is not None:
             on_cycle()

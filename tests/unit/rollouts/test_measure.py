@@ -30,7 +30,7 @@ def test_errors_of_two_samples() -> None:
 
 
 def test_bodies_of_a_start_are_judged_together() -> None:
-    """The best sample is that of the whole scene: not of one body here and of another there."""
+    """The best sample is that of all bodies: not of one body here and of another there."""
     truth = np.zeros((1, 2, 2, 2))
     sampled = np.zeros((1, 2, 2, 2, 2))
     sampled[0, 0, 1, :, 0] = 0.0, 4.0

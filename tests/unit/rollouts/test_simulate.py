@@ -17,8 +17,8 @@ from teamclone.models.clone import Clone
 from teamclone.models.config import EgocentricConfig
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rollouts.policies import AsLogged, Cloned, GoingOn
-from teamclone.rollouts.scene import Scene, slots_of
 from teamclone.rollouts.simulate import simulate
+from teamclone.rollouts.worlds import Worlds, slots_of
 from teamclone.world.channels import PLAYER_CHANNELS
 from teamclone.world.state import State
 from teamclone.world.view import view
@@ -42,15 +42,15 @@ def rules(match: Match) -> Rules:
     return Rules.of(match.game.server_params, match.game.player_types)
 
 
-def scene_of(match: Match, logged: Logged, rules: Rules, frames: np.ndarray) -> Scene:
-    return Scene.of(logged, view(match, side=1), rules, frames)
+def worlds_of(match: Match, logged: Logged, rules: Rules, frames: np.ndarray) -> Worlds:
+    return Worlds.of(logged, view(match, side=1), rules, frames)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_scene_looks_as_the_frames_that_it_begins_with(match: Match, logged: Logged, rules: Rules, side: int) -> None:
     frames, actor = np.array([3, 40, 41]), np.array([5, 1, 9])
     expected = State.of(view(match, side=side), frames, actor).each()
-    found = scene_of(match, logged, rules, frames).state(np.arange(3), actor, side=side).each()
+    found = worlds_of(match, logged, rules, frames).state(np.arange(3), actor, side=side).each()
     for name, one, other in zip(State._fields, found, expected, strict=True):
         if name == "frame":
             continue
@@ -61,10 +61,10 @@ def test_a_cycle_later_it_looks_as_the_next_frame(match: Match, logged: Logged, 
     """Without noise, with the commands of the log; but for what no clone does, such as widening the view."""
     play = logged.frames["playmode"] == 3
     frames = np.flatnonzero(play[:-1] & play[1:])[:60]
-    scene = scene_of(match, logged, rules, frames)
+    worlds = worlds_of(match, logged, rules, frames)
     commands = logged.commands.select(frames)
-    bodies = step(scene.bodies, commands, rules, succeeded=logged.succeeded[frames])
-    later = scene.after(bodies, commands, commands.kind)
+    bodies = step(worlds.bodies, commands, rules, succeeded=logged.succeeded[frames])
+    later = worlds.after(bodies, commands, commands.kind)
     world = view(match, side=1)
     tolerance = {"stamina": 0.02, "capacity": 1.1, "body": 0.05}
     for index, name in enumerate(PLAYER_CHANNELS):
@@ -84,7 +84,9 @@ def test_who_does_as_in_the_log_is_where_the_log_has_them(match: Match, logged: 
     runs = [frame for frame in range(len(play) - 20) if play[frame : frame + 21].all()]
     frames = np.array(runs[::20])
     assert len(frames) >= 4
-    went = simulate(scene_of(match, logged, rules, frames), frames, [AsLogged(logged, EVERYBODY)], horizon=20, rng=None)
+    went = simulate(
+        worlds_of(match, logged, rules, frames), frames, [AsLogged(logged, EVERYBODY)], horizon=20, rng=None
+    )
     at = frames[:, None] + np.arange(21)
     np.testing.assert_allclose(went.x[..., :BALL], logged.bodies.x[at][..., :BALL], atol=1e-5)
     off = np.hypot(went.x - logged.bodies.x[at], went.y - logged.bodies.y[at])[..., BALL]
@@ -93,8 +95,8 @@ def test_who_does_as_in_the_log_is_where_the_log_has_them(match: Match, logged: 
 
 def test_who_goes_on_keeps_the_velocity(match: Match, logged: Logged, rules: Rules) -> None:
     frames = np.array([10])
-    scene = scene_of(match, logged, rules, frames)
-    went = simulate(scene, frames, [GoingOn.of(scene, EVERYBODY)], horizon=3, rng=None)
+    worlds = worlds_of(match, logged, rules, frames)
+    went = simulate(worlds, frames, [GoingOn.of(worlds, EVERYBODY)], horizon=3, rng=None)
     steps = np.diff(went.x[0, :, :BALL], axis=0)
     free = ~(np.abs(steps - steps[0]) > 1e-5).any(axis=0)
     assert free.sum() > 15
@@ -130,7 +132,7 @@ def test_a_clone_moves_its_field_players_and_nobody_else(
     def run(seed: int, *, point: bool) -> np.ndarray:
         policies = [Cloned(clone, side, point, torch.Generator().manual_seed(seed)), AsLogged(logged, others)]
         rng = None if point else np.random.default_rng(seed)
-        went = simulate(scene_of(match, logged, rules, frames), frames, policies, horizon=8, rng=rng)
+        went = simulate(worlds_of(match, logged, rules, frames), frames, policies, horizon=8, rng=rng)
         return np.stack([went.x, went.y], axis=-1)
 
     one, again, other = run(1, point=False), run(1, point=False), run(2, point=False)

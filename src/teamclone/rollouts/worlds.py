@@ -1,4 +1,4 @@
-"""``Scene``: the worlds of a roll-out, from frames of a match to what a model sees of the cycles that were made up."""
+"""``Worlds``: the worlds of a roll-out, from frames of a match to what a model sees of the cycles that were made up."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from teamclone.world.world import World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class Worlds:
     """n worlds of one match in the same cycle of their roll-outs.
 
     Attributes:
@@ -43,8 +43,8 @@ class Scene:
     server: NDArray[np.float64]
 
     @classmethod
-    def of(cls, match: Logged, world: World, rules: Rules, frames: NDArray[np.int64]) -> Scene:
-        """Return the scene of some frames of a match; ``world`` is that of its left team."""
+    def of(cls, match: Logged, world: World, rules: Rules, frames: NDArray[np.int64]) -> Worlds:
+        """Return the worlds of some frames of a match; ``world`` is that of its left team."""
         return cls(
             bodies=match.bodies.select(frames),
             players=world.players[frames].copy(),
@@ -53,8 +53,8 @@ class Scene:
             server=world.server,
         )
 
-    def after(self, bodies: Bodies, commands: Commands, executed: NDArray[np.uint8]) -> Scene:
-        """Return the scene a cycle later.
+    def after(self, bodies: Bodies, commands: Commands, executed: NDArray[np.uint8]) -> Worlds:
+        """Return the worlds a cycle later.
 
         Args:
             bodies: of the next cycle. commands: what was done. executed: (n, 22) CommandKind of each player, 0 none.

@@ -128,7 +128,7 @@ def clean_match(
     state = players["state"][:-1, own]
     due = players_to_model(frames, players, side=side, repertoire=repertoire)[:-1]
     idle = due & ~has_command[:-1, own]
-    frozen = idle & ((state & (state_bits.TACKLE | state_bits.TACKLE_FAULT | state_bits.FOUL_CHARGED)) != 0)
+    frozen = idle & ((state & (state_bits.TACKLES | state_bits.FOUL_CHARGED)) != 0)
 
     kind_index = np.zeros(max(CommandKind) + 1, np.uint8)
     kind_index[kinds] = np.arange(len(kinds))

@@ -115,6 +115,13 @@ def of_types(bodies: Bodies, rules: Rules, name: str) -> NDArray[np.float64]:
     return values
 
 
+def decays(bodies: Bodies, rules: Rules) -> NDArray[np.float64]:
+    """Return (n, 23) the share of its velocity that each body keeps at the end of a cycle."""
+    decay = np.full(bodies.x.shape, rules.server["ball_decay"])
+    decay[:, :BALL] = of_types(bodies, rules, "player_decay")
+    return decay
+
+
 def radii(bodies: Bodies, rules: Rules) -> NDArray[np.float64]:
     """Return (n, 23) radii of bodies in metres; -inf of players off the field, who meet nobody."""
     radius = np.full(bodies.x.shape, rules.server["ball_size"])

@@ -16,12 +16,12 @@ from teamclone.rcss import state_bits
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS
 
-_TACKLES = state_bits.TACKLE | state_bits.TACKLE_FAULT
-_CATCHES = state_bits.CATCH | state_bits.CATCH_FAULT
 _MEANT = ("on", "true")
 """Words of a tackle that means a foul."""
 _TAKING_LEGS = (CommandKind.TURN, CommandKind.MOVE, CommandKind.TACKLE, CommandKind.DASH)
 """Commands that take both legs (`player.cpp`, `leg.cpp`)."""
+RESOLUTION = 1e-4
+"""Metres by which text logs round places and velocities."""
 _COLLIDED = state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE
 
 
@@ -51,7 +51,7 @@ def bodies_of(frames: Columns, players: Columns) -> Bodies:
         on_field=(state & state_bits.STAND) != 0,
         goalie=(state & state_bits.GOALIE) != 0,
         frozen=np.maximum(
-            _left(frames, (state & _TACKLES) != 0, again=rose(players, CommandKind.TACKLE)),
+            _left(frames, (state & state_bits.TACKLES) != 0, again=rose(players, CommandKind.TACKLE)),
             _left(frames, (state & state_bits.FOUL_CHARGED) != 0),
         ),
         banned=np.zeros(state.shape, np.int64),
@@ -120,8 +120,8 @@ class Logged:
         foul[_place(log, tackles)] = [text(int(index)) in _MEANT for index in tackles]
         state = np.zeros_like(players["state"])
         state[:-1] = players["state"][1:]
-        succeeded = (kind == CommandKind.TACKLE) & ((state & _TACKLES) == state_bits.TACKLE)
-        succeeded |= (kind == CommandKind.CATCH) & ((state & _CATCHES) == state_bits.CATCH)
+        succeeded = (kind == CommandKind.TACKLE) & ((state & state_bits.TACKLES) == state_bits.TACKLE)
+        succeeded |= (kind == CommandKind.CATCH) & ((state & state_bits.CATCHES) == state_bits.CATCH)
         trainer = np.zeros(len(kind), np.bool_)
         acts = (log["side"] == 0) & (log["kind"] != CommandKind.DONE) & (log["frame"] >= 0)
         trainer[log["frame"][acts]] = True

@@ -13,9 +13,8 @@ from teamclone.dynamics.contacts import BOUNCE, collide
 from teamclone.dynamics.rules import Rules
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_TEAM
-from teamclone.rcss.playmodes import MOVE_MODES, PlayMode
+from teamclone.rcss.playmodes import MAY_MOVE, PlayMode
 
-_MAY_MOVE = np.isin(np.arange(256), MOVE_MODES)
 _MAY_CATCH = np.isin(np.arange(256), (PlayMode.PLAY_ON, PlayMode.PENALTY_TAKEN_L, PlayMode.PENALTY_TAKEN_R))
 
 
@@ -52,7 +51,7 @@ def receive(
         rng: draws whether catches succeed; None for the likelier.
         succeeded: (n, 22) whether they do, where that is known.
     """
-    moves = (commands.kind == CommandKind.MOVE) & bodies.on_field & _MAY_MOVE[bodies.mode][:, None]
+    moves = (commands.kind == CommandKind.MOVE) & bodies.on_field & MAY_MOVE[bodies.mode][:, None]
     caught = _catch(bodies, commands, rules, rng=rng, succeeded=succeeded)
     cycles = np.flatnonzero(caught.by >= 0)
     rows = np.union1d(cycles, np.flatnonzero(moves.any(axis=-1)))
@@ -63,9 +62,9 @@ def receive(
     turned = np.where(at[1] < N_TEAM, 1.0, -1.0)
     x[at], y[at] = (turned * commands.numbers[..., axis][at] for axis in (0, 1))
     keeper = cycles, caught.by[cycles]
-    ball = cycles, np.full(len(cycles), BALL)
+    ball, radius = (cycles, np.full(len(cycles), BALL)), radii(bodies, rules)
     angle = np.arctan2(y[ball] - y[keeper], x[ball] - x[keeper])
-    reach = rules.types["player_size"][bodies.type[keeper]] + rules.server["ball_size"]
+    reach = radius[keeper] + radius[ball]
     x[keeper], y[keeper] = x[ball] - reach * np.cos(angle), y[ball] - reach * np.sin(angle)
     body[keeper] = formulas.degrees(angle)
     for velocity in (vx, vy):
@@ -73,7 +72,7 @@ def receive(
     if rules.referee:
         mode[cycles] = np.where(keeper[1] < N_TEAM, PlayMode.FREE_KICK_L, PlayMode.FREE_KICK_R)
     some_x, some_y = x[rows], y[rows]
-    touched = collide(some_x, some_y, radii(bodies, rules)[rows], ball_stays=mode[rows] != PlayMode.PLAY_ON, rng=rng)
+    touched = collide(some_x, some_y, radius[rows], ball_stays=mode[rows] != PlayMode.PLAY_ON, rng=rng)
     x[rows], y[rows] = some_x, some_y
     for velocity in (vx, vy):
         velocity[rows] *= np.where(touched, BOUNCE, 1.0)

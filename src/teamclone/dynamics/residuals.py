@@ -11,19 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.dynamics import formulas
-from teamclone.dynamics.bodies import BALL, N_BODIES, Bodies, of_types, radii
+from teamclone.dynamics.bodies import BALL, N_BODIES, Bodies, decays, of_types, radii
 from teamclone.dynamics.contacts import BOUNCE, near_a_post
-from teamclone.dynamics.logged import Logged
+from teamclone.dynamics.logged import RESOLUTION, Logged
 from teamclone.dynamics.motion import set_off
 from teamclone.dynamics.received import receive
 from teamclone.dynamics.rules import Rules
-from teamclone.logs.align import follows
+from teamclone.logs.align import plays_on
 from teamclone.rcss import pitch
 from teamclone.rcss.commands import CommandKind
-from teamclone.rcss.playmodes import PlayMode
 
-_STEP = 1e-4
-"""Resolution of positions and velocities in text logs."""
 _EXACT = {"neck": 2e-3, "stamina": 0.03, "effort": 3e-5, "recovery": 3e-5, "capacity": 1.1}
 """What the rounding of a log explains of values that no noise changes."""
 _NEAR_THRESHOLD = 0.03
@@ -78,7 +75,7 @@ class Residuals:
 
 def residuals(match: Logged, rules: Rules) -> Residuals:
     """Return the residuals of a match."""
-    at = np.flatnonzero(_in_play(match))
+    at = np.flatnonzero(plays_on(match.frames) & ~match.trainer)
     dropped = _dropped(match.bodies.select(at), match.bodies.select(at + 1))
     held = ((match.commands.kind[at] == CommandKind.CATCH) & match.succeeded[at]).any(axis=-1)
     at = at[~dropped & ~held]
@@ -93,16 +90,8 @@ def residuals(match: Logged, rules: Rules) -> Residuals:
         touching=int(match.bodies.touched[at + 1].sum()),
         dropped=int(dropped.sum()),
         caught=int(held.sum()),
-        unknown=int(match.unknown[at].sum()),
+        unknown=int(compare.unknown.sum()),
     )
-
-
-def _in_play(match: Logged) -> NDArray[np.bool_]:
-    """Return (n_frames,) from which frames a step is compared."""
-    play_on = match.frames["playmode"] == PlayMode.PLAY_ON
-    compared: NDArray[np.bool_] = play_on & follows(match.frames) & ~match.trainer
-    compared[:-1] &= play_on[1:]
-    return compared
 
 
 def _dropped(before: Bodies, after: Bodies) -> NDArray[np.bool_]:
@@ -125,39 +114,39 @@ class _Compare:
 
     def __init__(self, match: Logged, at: NDArray[np.int64], rules: Rules) -> None:
         before, after = match.bodies.select(at), match.bodies.select(at + 1)
-        commands, succeeded, unknown = match.commands.select(at), match.succeeded[at], match.unknown[at]
+        commands, succeeded = match.commands.select(at), match.succeeded[at]
+        self.unknown = match.unknown[at]
         received, caught = receive(before, commands, rules, succeeded=succeeded)
         self.before, self.after, self.rules = before, after, rules
         self.motion = set_off(received, commands, rules, caught=caught, succeeded=succeeded)
         self.there = before.on_field & after.on_field & (before.type == after.type)
-        self.known = self.there & ~unknown
+        self.known = self.there & ~self.unknown
         pushes = (commands.kind == CommandKind.KICK) | succeeded
-        self.ball_known = ~(unknown & pushes).any(axis=-1)
+        self.ball_known = ~(self.unknown & pushes).any(axis=-1)
 
     def moved(self) -> dict[str, Residual]:
         """Return ``position``, ``velocity`` and ``rebound``."""
         before, after, motion = self.before, self.after, self.motion
-        decay = np.full(before.x.shape, self.rules.server["ball_decay"])
-        decay[:, :BALL] = of_types(before, self.rules, "player_decay")
+        decay = decays(before, self.rules)
         dx, dy = after.x - before.x, after.y - before.y
         there, known = self._with_ball(self.there, np.True_), self._with_ball(self.known, self.ball_known)
         at_post = near_a_post(
-            before.x, before.y, motion.vx, motion.vy, radii(before, self.rules) + motion.noise + _STEP
+            before.x, before.y, motion.vx, motion.vy, radii(before, self.rules) + motion.noise + RESOLUTION
         )
         free = there & ~after.touched & ~at_post & ~self._at_the_edge()
-        rounding = 1.5 * _STEP
+        rounding = 1.5 * RESOLUTION
         position = np.hypot(dx - after.vx / decay, dy - after.vy / decay)
         velocity = np.hypot(dx - motion.vx, dy - motion.vy)
         rebound = np.hypot(after.vx - BOUNCE * decay * motion.vx, after.vy - BOUNCE * decay * motion.vy)
         collided = after.touched & ~at_post
         return {
-            "position": _residual(position, free, rounding=rounding + 0.8 * _STEP / decay),
-            "velocity": _residual(velocity, free & known, noise=motion.noise, rounding=3 * _STEP),
+            "position": _residual(position, free, rounding=rounding + 0.8 * RESOLUTION / decay),
+            "velocity": _residual(velocity, free & known, noise=motion.noise, rounding=3 * RESOLUTION),
             "rebound": _residual(
                 rebound,
                 known & collided,
                 noise=-BOUNCE * decay * motion.noise,
-                rounding=2 * _STEP,
+                rounding=2 * RESOLUTION,
             ),
         }
 
@@ -169,7 +158,9 @@ class _Compare:
         turned = np.abs((turned + 180.0) % 360.0 - 180.0)
         # The speed that slows a turn is known to the log's resolution.
         inertia = of_types(self.before, self.rules, "inertia_moment")
-        return _residual(off, self.known, noise=self.motion.body_noise, rounding=2e-3 + 1.2 * turned * inertia * _STEP)
+        return _residual(
+            off, self.known, noise=self.motion.body_noise, rounding=2e-3 + 1.2 * turned * inertia * RESOLUTION
+        )
 
     def rested(self) -> dict[str, NDArray[np.float64]]:
         """Return (n, 22) what neck, stamina and the like should be."""
@@ -197,7 +188,7 @@ class _Compare:
     def _at_the_edge(self) -> NDArray[np.bool_]:
         """Return (n, 23) who is where the referee keeps players from leaving the pitch's surroundings."""
         x, y = np.abs(self.after.x), np.abs(self.after.y)
-        edge: NDArray[np.bool_] = (x >= pitch.MAX_X - _STEP) | (y >= pitch.MAX_Y - _STEP)
+        edge: NDArray[np.bool_] = (x >= pitch.MAX_X - RESOLUTION) | (y >= pitch.MAX_Y - RESOLUTION)
         edge[:, BALL] = False
         return edge
 

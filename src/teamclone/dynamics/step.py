@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.dynamics import formulas
-from teamclone.dynamics.bodies import BALL, Bodies, Commands, of_types, radii
+from teamclone.dynamics.bodies import BALL, Bodies, Commands, decays, of_types, radii
 from teamclone.dynamics.contacts import BOUNCE, collide, move_past_posts
 from teamclone.dynamics.motion import Motion, set_off
 from teamclone.dynamics.received import hold, receive
@@ -72,8 +72,7 @@ def _moved(bodies: Bodies, motion: Motion, rules: Rules, rng: np.random.Generato
     still = np.isinf(radius) | (bodies.mode == PlayMode.BEFORE_KICK_OFF)[:, None]
     vx[still] = vy[still] = 0.0
     x, y, touched = move_past_posts(bodies.x, bodies.y, vx, vy, radius)
-    decay = np.full(vx.shape, rules.server["ball_decay"])
-    decay[:, :BALL] = of_types(bodies, rules, "player_decay")
+    decay = decays(bodies, rules)
     vx *= decay
     vy *= decay
     begins = motion.pushed.any(axis=-1) & _BEGINS[bodies.mode]

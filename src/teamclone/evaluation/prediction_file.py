@@ -82,7 +82,7 @@ def predict_logs(
         return None if on_progress is None else lambda done, total: on_progress(path, done, total)
 
     results = []
-    with _writing(out) as write:
+    with writing(out) as write:
         for path in logs:
             match_id = None
             try:
@@ -135,7 +135,7 @@ class _JsonLines:
 
 
 @contextmanager
-def _writing(out: Path) -> Iterator[Callable[[pa.Table], None]]:
+def writing(out: Path) -> Iterator[Callable[[pa.Table], None]]:
     """Return a function that appends a table to a file, which gets its name when all of it is there."""
     out.parent.mkdir(parents=True, exist_ok=True)
     temporary = out.with_name(f".{out.name}.part")

@@ -15,14 +15,12 @@ from teamclone.logs.columns import counter_name
 from teamclone.logs.match import Columns
 from teamclone.rcss.commands import BODY_KINDS, CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
-from teamclone.rcss.playmodes import MOVE_MODES
+from teamclone.rcss.playmodes import MAY_MOVE, PlayMode
 
 _STOPPAGES = 1 << 20
 
 _IS_BODY = np.zeros(256, np.bool_)
 _IS_BODY[list(BODY_KINDS)] = True
-_MAY_MOVE = np.zeros(256, np.bool_)
-_MAY_MOVE[list(MOVE_MODES)] = True
 
 
 def frame_of(frames: Columns, cycle: NDArray[Any], stoppage: NDArray[Any], *, has_stoppage: bool) -> NDArray[np.int32]:
@@ -69,7 +67,7 @@ def body_commands(commands: Columns, playmode: NDArray[np.uint8]) -> NDArray[np.
     body &= commands["frame"] >= 0
     body &= commands["unum"] > 0
     index = np.flatnonzero(body)
-    may_move = _MAY_MOVE[playmode[commands["frame"][index]]]
+    may_move = MAY_MOVE[playmode[commands["frame"][index]]]
     taking: NDArray[np.int64] = index[(commands["kind"][index] != CommandKind.MOVE) | may_move]
     return taking
 
@@ -98,6 +96,14 @@ def follows(frames: Columns) -> NDArray[np.bool_]:
     made = np.zeros(len(frames["cycle"]), np.bool_)
     made[:-1] = (cycle == 1) | ((cycle == 0) & (stoppage == 1))
     return made
+
+
+def plays_on(frames: Columns) -> NDArray[np.bool_]:
+    """Return whether play_on goes on from a frame to the next step of the simulator, shape (n_frames,)."""
+    play_on = frames["playmode"] == PlayMode.PLAY_ON
+    goes_on: NDArray[np.bool_] = play_on & follows(frames)
+    goes_on[:-1] &= play_on[1:]
+    return goes_on
 
 
 def executed_kind(frames: Columns, players: Columns) -> NDArray[np.uint8]:

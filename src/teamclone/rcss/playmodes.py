@@ -80,6 +80,10 @@ MOVE_MODES = (
 In others it ignores it and the player's slot stays free (rcssserver `player.cpp`, move).
 """
 
+MAY_MOVE = np.zeros(256, np.bool_)
+"""(256,) whether a play mode is one of MOVE_MODES."""
+MAY_MOVE[list(MOVE_MODES)] = True
+
 
 class Situation(IntEnum):
     """The meaning of a play mode for the players, whichever team's it is."""

@@ -18,6 +18,8 @@ BALL_COLLIDE = 0x400
 PLAYER_COLLIDE = 0x800
 TACKLE = 0x1000
 TACKLE_FAULT = 0x2000
+KICKS, CATCHES, TACKLES = KICK | KICK_FAULT, CATCH | CATCH_FAULT, TACKLE | TACKLE_FAULT
+"""Both bits of a command: whether it was given at all, and by equality with the first one whether it succeeded."""
 BACK_PASS = 0x4000
 FREE_KICK_FAULT = 0x8000
 POST_COLLIDE = 0x10000

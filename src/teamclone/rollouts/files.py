@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet
 from numpy.typing import NDArray
 
 from teamclone import __version__
 from teamclone.dynamics.bodies import BALL, N_BODIES
+from teamclone.evaluation.prediction_file import writing
 from teamclone.plots.style import LIGHT, style
 from teamclone.rcss.players import N_TEAM
 from teamclone.rollouts.run import MatchRollouts, RolloutConfig, figures
@@ -69,17 +69,11 @@ def write_rollouts(
 
 def _write_trajectories(path: Path, matches: Sequence[MatchRollouts]) -> None:
     """Write one row a body, cycle and sample; ``sample`` is -1 for what happened, see _CODES."""
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        with pyarrow.parquet.ParquetWriter(temporary, _SCHEMA, compression="zstd") as writer:
-            for match in matches:
-                places = {"truth": match.truth[:, None], **match.places}
-                for name, values in places.items():
-                    for start in range(len(match.starts)):
-                        writer.write_table(_rows(match, start, name, values[start]))
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with writing(path) as write:
+        for match in matches:
+            for name, values in {"truth": match.truth[:, None], **match.places}.items():
+                for start in range(len(match.starts)):
+                    write(_rows(match, start, name, values[start]))
 
 
 _SCHEMA = pa.schema(

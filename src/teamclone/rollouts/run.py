@@ -20,10 +20,9 @@ from teamclone.dynamics.rules import Rules
 from teamclone.errors import TeamcloneError, UsageError
 from teamclone.evaluation.prediction_table import MatchColumns
 from teamclone.logs import read_match
-from teamclone.logs.align import follows
+from teamclone.logs.align import plays_on
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS
-from teamclone.rcss.playmodes import PlayMode
 from teamclone.rollouts.measure import Ahead, measure
 from teamclone.rollouts.policies import AsLogged, Cloned, GoingOn, Policy
 from teamclone.rollouts.simulate import simulate
@@ -181,12 +180,10 @@ def _finite(ahead: Ahead) -> dict[str, Any]:
 
 def _cycles_left(match: Logged) -> NDArray[np.int64]:
     """Return (n_frames,) for how many cycles play_on goes on after each frame."""
-    play = match.frames["playmode"] == PlayMode.PLAY_ON
-    goes_on = follows(match.frames) & play
-    goes_on[:-1] &= play[1:]
+    goes_on = plays_on(match.frames)
     # The next frame after which it does not go on.
     ends = np.flatnonzero(~goes_on)
-    place = np.arange(len(play))
+    place = np.arange(len(goes_on))
     left: NDArray[np.int64] = ends[np.searchsorted(ends, place)] - place
     return left
 

@@ -45,7 +45,7 @@ PLAYER_COLUMNS = (
 _FLAGS = (
     (FLAG_ON_FIELD, state_bits.STAND),
     (FLAG_GOALIE, state_bits.GOALIE),
-    (FLAG_TACKLING, state_bits.TACKLE | state_bits.TACKLE_FAULT),
+    (FLAG_TACKLING, state_bits.TACKLES),
     (FLAG_CHARGED, state_bits.FOUL_CHARGED),
     (FLAG_COLLIDED, state_bits.BALL_COLLIDE | state_bits.PLAYER_COLLIDE | state_bits.POST_COLLIDE),
     (FLAG_YELLOW, state_bits.YELLOW_CARD),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.situations import dashed
 
 from teamclone.planner import players, scene
 from teamclone.planner.players import HARDLY_M, SELF_PASS, TACKLE, Allowance, short_m
@@ -27,16 +28,6 @@ def player(*, body: float = 0.0, vx: float = 0.0, flags: int = FLAG_ON_FIELD) ->
     made: scene.Array = scene.scenes(np.zeros((1, 4)), channels, types, SERVER_DEFAULTS[None])[0]
     scene.complete(made, 0)
     return made[0]
-
-
-def dashed(count: int) -> float:
-    """Metres of dashes at full power from rest."""
-    speed = metres = 0.0
-    for _ in range(count):
-        speed += 0.6
-        metres += speed
-        speed *= 0.4
-    return metres
 
 
 @pytest.mark.parametrize(("cycle", "later"), [(1, 0), (5, 0), (5, 2), (40, 2), (50, 2)])

@@ -6,21 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from tests.situations import dashed
 
 from teamclone.planner import dribble, scene, self_pass
 from teamclone.rcss.player_types import DEFAULTS
 from teamclone.rcss.server_params import SERVER_DEFAULTS
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD, TYPE_FIELD
-
-
-def dashed(count: int) -> float:
-    """Metres of dashes at full power from rest."""
-    speed = metres = 0.0
-    for _ in range(count):
-        speed += 0.6
-        metres += speed
-        speed *= 0.4
-    return metres
 
 
 def ends(x: float, y: float, body: float, *, stamina: float = 8000.0) -> dict[int, list[int]]:

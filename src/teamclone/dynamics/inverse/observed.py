@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.dynamics.bodies import BALL, Bodies, of_types
+from teamclone.dynamics.bodies import BALL, Bodies, decays
 from teamclone.dynamics.contacts import BOUNCE
-from teamclone.dynamics.logged import bodies_of
+from teamclone.dynamics.logged import RESOLUTION, bodies_of
 from teamclone.dynamics.rules import Rules
 from teamclone.logs.align import follows
 from teamclone.logs.match import Columns
@@ -18,9 +18,6 @@ from teamclone.rcss import pitch, state_bits
 
 At = tuple[NDArray[np.signedinteger[Any]], ...]
 """Frame and place of some players."""
-
-RESOLUTION = 1e-4
-"""Metres by which text logs round places and velocities."""
 
 _AGREE = 1e-3
 """Metres per cycle by which a displacement and the velocity logged after it may differ: both are rounded."""
@@ -56,8 +53,7 @@ class Observed:
 def observe(frames: Columns, players: Columns, rules: Rules) -> Observed:
     """Return the velocities of all bodies in the cycle after each frame of a match."""
     bodies = _with_ball(bodies_of(frames, players), rules)
-    decay = np.full(bodies.x.shape, rules.server["ball_decay"])
-    decay[:, :BALL] = of_types(bodies, rules, "player_decay")
+    decay = decays(bodies, rules)
     left = {name: np.full(bodies.x.shape, np.nan) for name in ("vx", "vy")}
     contact = np.zeros(bodies.x.shape, np.bool_)
     after = bodies.select(slice(1, None))

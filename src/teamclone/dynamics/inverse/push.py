@@ -176,5 +176,6 @@ def _directions(likelihood: NDArray[np.float64], degrees: NDArray[np.float64]) -
 
 def _limited(velocity: NDArray[np.complex128], most: float) -> NDArray[np.complex128]:
     """Return velocities of at most a speed."""
-    speed = np.abs(velocity)
-    return velocity * np.where(speed > most, most / np.where(speed > most, speed, 1.0), 1.0)
+    x, y = formulas.limited(velocity.real, velocity.imag, most)
+    limited: NDArray[np.complex128] = x + 1j * y
+    return limited

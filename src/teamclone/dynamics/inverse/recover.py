@@ -15,11 +15,11 @@ from teamclone.dynamics import formulas
 from teamclone.dynamics.bodies import BALL
 from teamclone.dynamics.contacts import BOUNCE
 from teamclone.dynamics.inverse.dash import dashes
-from teamclone.dynamics.inverse.observed import RESOLUTION, At, Observed, observe
+from teamclone.dynamics.inverse.observed import At, Observed, observe
 from teamclone.dynamics.inverse.push import Pushes, kicks, tackles
 from teamclone.dynamics.inverse.recovered import Basis, Recovered
 from teamclone.dynamics.inverse.turn import neck_turns, turns
-from teamclone.dynamics.logged import rose
+from teamclone.dynamics.logged import RESOLUTION, rose
 from teamclone.dynamics.rules import Rules
 from teamclone.logs.align import executed_kind, follows
 from teamclone.logs.columns import counter_name
@@ -29,9 +29,6 @@ from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.playmodes import BALL_KICKED, BALL_TACKLED
 
-_KICKS = state_bits.KICK | state_bits.KICK_FAULT
-_TACKLES = state_bits.TACKLE | state_bits.TACKLE_FAULT
-_CATCHES = state_bits.CATCH | state_bits.CATCH_FAULT
 _APART = 0.35
 """Metres by which a collision puts a player away from where it moved to, but for crowds."""
 
@@ -74,11 +71,11 @@ def _kinds(frames: Columns, players: Columns) -> NDArray[np.uint8]:
     kind = executed_kind(frames, players)
     state, known = players["state"], follows(frames)[:-1, None]
     after = state[1:]
-    begun = ((after & _TACKLES) != 0) & ((state[:-1] & _TACKLES) == 0)
+    begun = ((after & state_bits.TACKLES) != 0) & ((state[:-1] & state_bits.TACKLES) == 0)
     by_state = {
         CommandKind.TACKLE: begun,
-        CommandKind.CATCH: (after & _CATCHES) == state_bits.CATCH,
-        CommandKind.KICK: (after & _KICKS) == state_bits.KICK,
+        CommandKind.CATCH: (after & state_bits.CATCHES) == state_bits.CATCH,
+        CommandKind.KICK: (after & state_bits.KICKS) == state_bits.KICK,
     }
     for one, did in by_state.items():
         uncounted = (players[counter_name(one)] < 0).all()
@@ -170,7 +167,7 @@ def _pushes(observed: Observed, players: Columns, kind: NDArray[np.uint8]) -> tu
     after = np.zeros_like(players["state"])
     after[:-1] = players["state"][1:]
     kicked = (kind == CommandKind.KICK) & BALL_KICKED[mode]
-    tackled = (kind == CommandKind.TACKLE) & ((after & _TACKLES) == state_bits.TACKLE) & BALL_TACKLED[mode]
+    tackled = (kind == CommandKind.TACKLE) & ((after & state_bits.TACKLES) == state_bits.TACKLE) & BALL_TACKLED[mode]
     caught = kind == CommandKind.CATCH
     shared = ((kicked | tackled | caught).sum(axis=-1) > 1)[:, None]
     seen = ~np.isnan(observed.vx[:, BALL:] + observed.vy[:, BALL:] + observed.before.vy[:, BALL:])

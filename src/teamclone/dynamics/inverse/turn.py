@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from teamclone.dynamics import formulas
 from teamclone.dynamics.inverse.candidates import CONFIDENCE, OF_TWO_ROUNDINGS, Candidates, habits, starts
-from teamclone.dynamics.inverse.observed import RESOLUTION as OF_VELOCITY
 from teamclone.dynamics.inverse.observed import At, Observed
+from teamclone.dynamics.logged import RESOLUTION as OF_VELOCITY
 from teamclone.rcss.players import N_TEAM
 
 RESOLUTION = 1e-3

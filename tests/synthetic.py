@@ -80,6 +80,7 @@ def make_dataset(
         "player": player,
         "kind": kind,
         "parameters": parameters,
+        "interval": np.zeros((len(frame), 2, 2)),
         "executed": np.ones(len(frame), bool),
         "turn_zero": np.zeros(len(frame), bool),
         "split": np.asarray(splits)[match[frame]],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from teamclone.errors import StoreError, UsageError
 from teamclone.evaluation.prediction_table import MatchColumns, PredictionTable, predict_match
 from teamclone.logs import Match, read_match
+from teamclone.logs.columns import Source
 from teamclone.rcss.player_types import FIELDS
 from teamclone.training.run import Run, open_run
 
@@ -104,6 +105,7 @@ def _columns(match: Match | Path | str, store: Store | None) -> MatchColumns:
         frames=tables["frames"],
         players=tables["player_states"],
         commands=tables["commands"],
+        source=Source(int(tables["commands"]["source"].max(initial=Source.LOGGED))),
         types=store.read_match_columns(str(match), "player_types", columns=FIELDS),
         params=store.read_parameters(str(match))["server"],
     )

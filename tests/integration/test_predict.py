@@ -148,13 +148,27 @@ def test_opponents_goalkeepers_and_chosen_numbers(clone: tc.LoadedClone, log: Pa
     assert set(table["unum"].to_pylist()) == {1, 7}
 
 
-def test_without_a_command_log_nothing_was_done(
+def test_without_a_command_log_the_game_log_says_what_was_done(
     clone: tc.LoadedClone, log: Path, table: pa.Table, tmp_path: Path
 ) -> None:
     alone = Path(shutil.copy(log, tmp_path))
     found = clone.predict(alone, team="HELIOS_base").to_arrow()
-    assert found["done"].null_count == found["log_loss"].null_count == found.num_rows == table.num_rows
     np.testing.assert_array_equal(found["p_kick"].to_numpy(), table["p_kick"].to_numpy())
+    assert set(table["source"].to_pylist()) == {"logged"}
+    assert set(found["source"].to_pylist()) <= {"recovered", None}
+    known = found["done"].is_valid()
+    assert pc.sum(known).as_py() > 0.99 * found.num_rows
+    assert found.filter(known)["done"].to_pylist() == table.filter(known)["done"].to_pylist()
+    powers = [one.filter(known)["done_dash_power"].to_numpy(zero_copy_only=False) for one in (found, table)]
+    assert np.nanmax(np.abs(powers[0] - powers[1])) < 1.0
+    # A kick beside another player's has no numbers that the game log shows.
+    kicks = found.filter(pc.equal(found["done"], "kick"))
+    assert pc.all(pc.equal(kicks["done_kick_power"].is_null(), kicks["parameter_log_loss"].is_null())).as_py()
+    # The same from a store without the command log.
+    store = tc.create_store(str(tmp_path / "store"))
+    store.add(tc.read_match(alone))
+    match_id = found["match_id"][0].as_py()
+    assert clone.predict(match_id, store=store, team="HELIOS_base").to_arrow().equals(found)
 
 
 def test_a_team_that_does_not_play(clone: tc.LoadedClone, log: Path) -> None:

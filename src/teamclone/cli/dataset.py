@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from teamclone.cli.common import choice, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from teamclone.dataset.build import DatasetConfig
 
 
 def dataset(
@@ -22,6 +25,13 @@ def dataset(
         str, typer.Option(help="executed: those that the server carried out; received: also refused ones.")
     ] = ("executed"),
     turn_zero: Annotated[str, typer.Option(help="keep or drop (turn 0), which means doing nothing.")] = "keep",
+    source: Annotated[
+        str,
+        typer.Option(
+            help="logged: commands of command logs; recovered: those that game logs imply; any: logged, but recovered "
+            "where there is no command log."
+        ),
+    ] = "any",
     train_goalkeepers: Annotated[
         bool, typer.Option("--train-goalkeepers", help="Train on goalkeepers' commands, too; never test on them.")
     ] = False,
@@ -51,10 +61,8 @@ def dataset(
     as_json: Annotated[bool, typer.Option("--json", help="Print the cleaning report as JSON.")] = False,
 ) -> None:
     """Clean a store and bind every command of one or more teams to the state it was decided on."""
-    from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
+    from teamclone.dataset.build import DatasetConfig, Sources, SplitBy
     from teamclone.dataset.clean import Commands, TurnZero
-    from teamclone.store import open_store
-    from teamclone.system.cluster import executor_of
 
     config = DatasetConfig(
         teams=tuple(team),
@@ -62,6 +70,7 @@ def dataset(
         split=choice(SplitBy, split, option="--split"),
         commands=choice(Commands, commands, option="--commands"),
         turn_zero=choice(TurnZero, turn_zero, option="--turn-zero"),
+        source=choice(Sources, source, option="--source"),
         train_goalkeepers=train_goalkeepers,
         goalkeepers=goalkeepers,
         set_plays=set_plays,
@@ -72,9 +81,24 @@ def dataset(
         validation=validation,
         seed=seed,
     )
+    report = _build(config, store, out, scheduler=scheduler, jobs=jobs, replace=replace)
+    if as_json:
+        print_json(report)
+    else:
+        _print(report, out, where="in play" if set_plays else "in play_on")
+
+
+def _build(
+    config: DatasetConfig, store: str, out: Path, *, scheduler: str | None, jobs: int | None, replace: bool
+) -> dict[str, Any]:
+    """Build the dataset behind a progress bar; return the cleaning report."""
+    from teamclone.dataset.build import build_dataset
+    from teamclone.store import open_store
+    from teamclone.system.cluster import executor_of
+
     with executor_of(scheduler, jobs=jobs) as executor, progress("dataset") as bar:
         task = bar.add_task("", total=None)
-        report = build_dataset(
+        return build_dataset(
             config,
             store=open_store(store),
             out=out,
@@ -83,10 +107,6 @@ def dataset(
             replace=replace,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    if as_json:
-        print_json(report)
-    else:
-        _print(report, out, where="in play" if set_plays else "in play_on")
 
 
 def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
@@ -120,6 +140,11 @@ def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
         f"command, {report['frozen']:,} of them after a tackle or foul."
     )
     print(f"{report['turn_zero']:,} rows are (turn 0).")
+    if report["recovered"]:
+        print(f"{report['recovered']:,} rows are recovered: game logs imply them, no command log has them.")
+    if without := report["matches_without_commands"]:
+        names = ", ".join(without[:3]) + (", ..." if len(without) > 3 else "")
+        print(f"{len(without)} match(es) have no commands to take and are in no split: {names}.")
     if report["matches_without_team"]:
         print(f"{report['matches_without_team']} match(es) of the store are without {report['team']}.")
     print(f"Wrote {out}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -20,7 +20,7 @@ def matches(
         print_json(rows)
         return
     print_table(
-        ("match", "started", "left", "score", "right", "frames", "play_on", "commands", "log", "complete"),
+        ("match", "started", "left", "score", "right", "frames", "play_on", "commands", "source", "log", "complete"),
         [
             (
                 row["match_id"],
@@ -31,6 +31,7 @@ def matches(
                 row["n_frames"],
                 row["n_play_on_frames"],
                 row["n_commands"],
+                source(row),
                 row["log_version"],
                 "yes" if row["complete"] else "no",
             )
@@ -39,6 +40,11 @@ def matches(
         numeric=(5, 6, 7),
     )
     print(f"{len(rows)} matches")
+
+
+def source(row: dict[str, Any]) -> str:
+    """Return where the commands of a match are known from."""
+    return "logged" if row["command_log"] else "recovered" if row["n_commands"] else "-"
 
 
 def score(row: dict[str, int]) -> str:

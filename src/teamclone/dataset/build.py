@@ -18,9 +18,11 @@ from teamclone.dataset import clean, layout
 from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
+from teamclone.dynamics.inverse.columns import recovered_commands
 from teamclone.errors import DatasetError, UsageError, choose
+from teamclone.logs.columns import INTERVALS, Source, counter_name
 from teamclone.rcss import server_params
-from teamclone.rcss.commands import CLONED, REPERTOIRE
+from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
 from teamclone.store import Store
 from teamclone.store.shared import SharedStore
@@ -43,6 +45,17 @@ class SplitBy(StrEnum):
     ROWS = "rows"
 
 
+class Sources(StrEnum):
+    """Which commands of a match are taken, see `store.schema.COMMANDS`."""
+
+    ANY = "any"
+    """Those that the store has: of the command log; of a match without one those that its game log implies."""
+    LOGGED = "logged"
+    """Those of command logs; matches without one give nothing."""
+    RECOVERED = "recovered"
+    """Those that the game log implies, also of matches that have a command log."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DatasetConfig:
     """The settings of a dataset.
@@ -52,7 +65,8 @@ class DatasetConfig:
             two of them is in the dataset twice; both entries fall into the same split.
         unseen: opponents kept out of training, validation and test.
         split: see SplitBy.
-        commands, turn_zero: see `clean`.
+        commands, turn_zero: see `clean`. Recovered commands are those that the server executed, whatever is asked for.
+        source: see Sources.
         train_goalkeepers: let goalkeepers' commands, too, be training samples; never validation or test. A team may
             give its goalkeeper another number than usual. A field player then wears the usual one, which a network
             that knows players by their numbers has otherwise never seen.
@@ -70,6 +84,7 @@ class DatasetConfig:
     split: SplitBy = SplitBy.MATCH
     commands: Commands = Commands.EXECUTED
     turn_zero: TurnZero = TurnZero.KEEP
+    source: Sources = Sources.ANY
     train_goalkeepers: bool = False
     goalkeepers: bool = False
     set_plays: bool = False
@@ -105,11 +120,14 @@ class DatasetConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Entry:
+    """A match of a team; ``source`` is that of its commands in the store, None where it has none of the team."""
+
     match_id: str
     name: str
     side: int
     team: str
     opponent: str
+    source: Source | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,6 +136,7 @@ class _Task:
     entry: _Entry
     commands: Commands
     turn_zero: TurnZero
+    recover: bool
     goalkeepers: bool
     repertoire: tuple[str, ...]
 
@@ -153,7 +172,8 @@ def build_dataset(
         ClusterError: the connection to the executor's workers was lost.
     """
     config.check()
-    entries, without_team = _entries(store, config)
+    found = _entries(store, config)
+    entries = found.usable
     splits = split_matches(
         [MatchKey(match_id=entry.match_id, team=entry.team, opponent=entry.opponent) for entry in entries],
         unseen=config.unseen,
@@ -177,12 +197,12 @@ def build_dataset(
             of_rows, name = _split_of_rows(match, task.entry, splits[task.entry.match_id], config)
             _add(writer, match, index=len(matches), split=of_rows)
             np.add.at(rows, (of_rows, match.samples["kind"]), 1)
-            row = _report_match(task.entry, match, split=name, repertoire=config.repertoire)
+            row = _report_match(task, match, split=name, repertoire=config.repertoire)
             matches.append(row if len(config.teams) == 1 else {"team": task.entry.team, **row})
             parameters.append(of_match)
             if on_progress is not None:
                 on_progress(len(matches), len(entries))
-        report = _report(config, matches, rows=rows, without_team=without_team)
+        report = _report(config, matches, rows=rows, entries=found)
         if not writer.n_samples:
             raise _nothing_left(out, config, report)
         writer.finish(
@@ -202,6 +222,7 @@ def _tasks(
             entry=entry,
             commands=config.commands,
             turn_zero=config.turn_zero,
+            recover=config.source is Sources.RECOVERED and entry.source is Source.LOGGED,
             goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
             repertoire=config.repertoire,
         )
@@ -222,8 +243,9 @@ def _split_of_rows(
 def _nothing_left(out: Path, config: DatasetConfig, report: dict[str, Any]) -> DatasetError:
     left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
     return DatasetError(
-        f"{out}: no command of {config.team} is left after cleaning ({left}). "
-        "Matches without a command log have no commands, and logs before version 3 do not show which were executed"
+        f"{out}: no command of {config.team} is left after cleaning ({left or 'no match has any'}). "
+        "Without a command log there are only the commands that the game log shows, and logs before version 3 do not "
+        "show which were executed"
     )
 
 
@@ -235,6 +257,7 @@ def _meta(config: DatasetConfig, matches: Sequence[dict[str, Any]], report: dict
         **({"commands": config.repertoire} if config.repertoire != CLONED else {}),
         "options": _options(config),
         "matches": [{key: value for key, value in row.items() if key != "rules"} for row in matches],
+        "recovered": report["recovered"],
         "cleaning": report,
     }
 
@@ -247,7 +270,7 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
         meta = open_dataset(folder).meta
     except DatasetError:
         return False
-    entries, _ = _entries(store, config)
+    entries = _entries(store, config).usable
     there = [match["match_id"] for match in meta["matches"]]
     options = json.loads(json.dumps(_options(config)))
     return meta["options"] == options and there == [entry.match_id for entry in entries]
@@ -274,10 +297,19 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     """Return the samples of one match and its parameters. Runs in a worker."""
     store, match_id = task.store.open(), task.entry.match_id
     params = store.read_parameters(match_id)["server"]
+    types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
+    frames = store.read_match_columns(match_id, "frames", columns=FRAME_COLUMNS)
+    players = store.read_match_columns(match_id, "player_states", columns=PLAYER_COLUMNS)
+    if task.recover:
+        players |= store.read_match_columns(match_id, "player_states", columns=[counter_name(CommandKind.TURN_NECK)])
+        commands, _ = recovered_commands(frames, players, types=types, params=params)
+    else:
+        intervals = [column.name for column in INTERVALS] if task.entry.source is Source.RECOVERED else []
+        commands = store.read_match_columns(match_id, "commands", columns=(*clean.COMMAND_COLUMNS, *intervals))
     samples = clean.clean_match(
-        store.read_match_columns(match_id, "frames", columns=FRAME_COLUMNS),
-        store.read_match_columns(match_id, "player_states", columns=PLAYER_COLUMNS),
-        store.read_match_columns(match_id, "commands", columns=clean.COMMAND_COLUMNS),
+        frames,
+        players,
+        commands,
         params,
         side=task.entry.side,
         keep=task.commands,
@@ -285,35 +317,53 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
         goalkeepers=task.goalkeepers,
         repertoire=task.repertoire,
     )
-    types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
     return samples, _Parameters(
         types=np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32),
         server=server_params.vector(params, version=server_params.OLDEST),
     )
 
 
-def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
-    """Return the teams' matches by match id, the left side first, and how many matches are without them."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Entries:
+    """The teams' matches by match id, the left side first.
+
+    Attributes:
+        usable: those from which there are commands to take. without_commands: names of the others.
+        without_team: how many matches of the store none of the teams plays in.
+    """
+
+    usable: list[_Entry]
+    without_commands: tuple[str, ...]
+    without_team: int
+
+
+def _entries(store: Store, config: DatasetConfig) -> _Entries:
+    """Return the teams' matches; splits are drawn from the usable ones alone."""
     if not config.teams or len(set(config.teams)) < len(config.teams):
         raise UsageError(f"expected different teams, got {', '.join(config.teams) or 'none'}; name each once")
+    sources = _sources(store, config.repertoire)
     entries: list[_Entry] = []
     teams: Counter[str] = Counter()
     rows = store.matches().to_pylist()
+    in_play = "n_frames" if config.set_plays else "n_play_on_frames"
+    lacking: set[str] = set()
     for row in rows:
         left, right = row["left_name"], row["right_name"]
         teams.update(name for name in (left, right) if name)
         for side, team, opponent in ((1, left, right), (-1, right, left)):
             if team not in config.teams or (side < 0 and left == right):
                 continue
-            entries.append(
-                _Entry(
-                    match_id=row["match_id"],
-                    name=row["game_log"] or row["command_log"] or row["match_id"],
-                    side=side,
-                    team=team,
-                    opponent=opponent or "nobody",
-                )
+            entry = _Entry(
+                match_id=row["match_id"],
+                name=row["game_log"] or row["command_log"] or row["match_id"],
+                side=side,
+                team=team,
+                opponent=opponent or "nobody",
+                source=sources.get((row["match_id"], side)),
             )
+            entries.append(entry)
+            if not row[in_play] or not _gives_commands(entry, config.source):
+                lacking.add(entry.match_id)
     for name in config.teams:
         if name not in teams:
             raise UsageError(f"team {name!r} is in no match of the store; {choose(name, sorted(teams))}")
@@ -322,8 +372,28 @@ def _entries(store: Store, config: DatasetConfig) -> tuple[list[_Entry], int]:
         if name not in opponents:
             remedy = choose(name, sorted(opponents))
             raise UsageError(f"unseen opponent {name!r} plays in no match of {config.team}; {remedy}")
-    without = len(rows) - len({entry.match_id for entry in entries})
-    return sorted(entries, key=lambda entry: entry.match_id), without
+    entries.sort(key=lambda entry: entry.match_id)
+    return _Entries(
+        usable=[entry for entry in entries if entry.match_id not in lacking],
+        without_commands=tuple(dict.fromkeys(entry.name for entry in entries if entry.match_id in lacking)),
+        without_team=len(rows) - len({entry.match_id for entry in entries}),
+    )
+
+
+def _gives_commands(entry: _Entry, wanted: Sources) -> bool:
+    if wanted is Sources.LOGGED:
+        return entry.source is Source.LOGGED
+    return entry.source is not None
+
+
+def _sources(store: Store, repertoire: Sequence[str]) -> dict[tuple[str, int], Source]:
+    """Return where the commands of each match and side are known from; those without commands are left out."""
+    kinds = ", ".join(str(int(CommandKind[name.upper()])) for name in repertoire if name != "none")
+    found = store.sql(
+        "select match_id, side, min(source) as source from commands "
+        f"where unum > 0 and frame >= 0 and valid and kind in ({kinds}) group by match_id, side"
+    )
+    return {(row["match_id"], row["side"]): Source(row["source"]) for row in found.to_pylist()}
 
 
 def _fixed(entries: Sequence[_Entry], config: DatasetConfig) -> dict[str, layout.Split]:
@@ -362,13 +432,16 @@ def _pad_types(types: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
     return padded
 
 
-def _report_match(entry: _Entry, match: MatchSamples, *, split: str, repertoire: Sequence[str]) -> dict[str, Any]:
+def _report_match(task: _Task, match: MatchSamples, *, split: str, repertoire: Sequence[str]) -> dict[str, Any]:
+    entry = task.entry
+    source = Source.RECOVERED if task.recover else entry.source
     return {
         "match_id": entry.match_id,
         "name": entry.name,
         "opponent": entry.opponent,
         "side": "left" if entry.side > 0 else "right",
         "split": split,
+        "source": "none" if source is None else source.name.lower(),
         "frames": len(match.frames["cycle"]),
         "rows": _by_kind(np.bincount(match.samples["kind"], minlength=len(repertoire)), repertoire),
         "executed": int(match.samples["executed"].sum()),
@@ -385,12 +458,13 @@ def _by_kind(counts: Iterable[int], repertoire: Sequence[str]) -> dict[str, int]
 
 
 def _report(
-    config: DatasetConfig, matches: Sequence[dict[str, Any]], *, rows: NDArray[np.int64], without_team: int
+    config: DatasetConfig, matches: Sequence[dict[str, Any]], *, rows: NDArray[np.int64], entries: _Entries
 ) -> dict[str, Any]:
     """Return the sums over all matches; ``rows`` is (n_splits, n_kinds)."""
     return {
         "team": config.team,
-        "matches_without_team": without_team,
+        "matches_without_team": entries.without_team,
+        "matches_without_commands": list(entries.without_commands),
         "rules": [
             {
                 "name": same[0]["name"],
@@ -399,6 +473,7 @@ def _report(
             }
             for same in zip(*(match["rules"] for match in matches), strict=True)
         ],
+        "recovered": sum(sum(match["rows"].values()) for match in matches if match["source"] == "recovered"),
         "rows": {split.name.lower(): _by_kind(rows[split], config.repertoire) for split in layout.Split},
         **{
             name: sum(match[name] for match in matches)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from teamclone.dataset import layout
 from teamclone.dynamics.commands import used_arguments
+from teamclone.logs import columns
 from teamclone.logs.align import executed_commands, executed_kind, first_body_commands, slot_of
 from teamclone.logs.columns import counter_name
 from teamclone.logs.match import Columns
@@ -28,7 +29,10 @@ _CATEGORICAL = slice(_MEASURED.stop, None)
 """Channels of ``World.players``."""
 
 COMMAND_COLUMNS = ("frame", "side", "unum", "kind", "legs", "valid", "arg0", "arg1", "arg2", "arg3")
-"""Columns of a match's commands that cleaning needs; of its frames and players it needs those of `world.view`."""
+"""Columns of a match's commands that cleaning needs; of its frames and players it needs those of `world.view`.
+
+With those of `columns.INTERVALS` the samples know how well their arguments are known.
+"""
 
 
 class Commands(StrEnum):
@@ -95,7 +99,7 @@ def clean_match(
 
     Args:
         frames: ``view.FRAME_COLUMNS``, (n_frames,). players: ``view.PLAYER_COLUMNS``, (n_frames, 22).
-        commands: COMMAND_COLUMNS, (n_commands,) in log order.
+        commands: COMMAND_COLUMNS, (n_commands,) in log order; of recovered commands ``columns.INTERVALS``, too.
         server_params: ranges of the arguments; the server's defaults where one is missing.
         side: the modelled team's, 1 left or -1 right.
         goalkeepers: keep the goalkeeper's commands, too.
@@ -132,11 +136,13 @@ def clean_match(
 
     kind_index = np.zeros(max(CommandKind) + 1, np.uint8)
     kind_index[kinds] = np.arange(len(kinds))
+    arguments = used_arguments({name: chain.column(name) for name in COMMAND_COLUMNS}, server_params)
     samples: Columns = {
         "frame": chain.column("frame").astype(np.int64),
         "player": (chain.column("unum") - 1).astype(np.uint8),
         "kind": kind_index[chain.column("kind")],
-        "parameters": used_arguments({name: chain.column(name) for name in COMMAND_COLUMNS}, server_params),
+        "parameters": np.nan_to_num(arguments),
+        "interval": _intervals(chain, arguments),
         "executed": executed,
         "turn_zero": is_turn_zero,
     }
@@ -234,6 +240,19 @@ def _bind(
             every if of_field is None else of_field[chain.column("frame"), slots[chain.rows]], "of field players"
         )
     chain.keep(np.isin(chain.rows, first_body_commands(chain.commands, frames["playmode"])), "first of the cycle")
+
+
+def _intervals(chain: _Chain, arguments: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Return (n, 2, 2) `layout.SAMPLE_ARRAYS` ``interval`` of the arguments (n, 2), NaN where they are not known."""
+    ends = np.zeros((*arguments.shape, 2), np.float16)
+    if columns.INTERVALS[0].name in chain.commands:
+        for index in range(2):
+            low, high = chain.column(f"low{index}"), chain.column(f"high{index}")
+            # What a team often does may be likelier than all of the interval, which knows the noise alone.
+            ends[:, index, 0] = np.nan_to_num(np.minimum(low - arguments[:, index], 0))
+            ends[:, index, 1] = np.nan_to_num(np.maximum(high - arguments[:, index], 0))
+    ends[np.isnan(arguments)] = -np.inf, np.inf
+    return ends
 
 
 def _with_none(samples: Columns, nothing: NDArray[np.bool_], *, kind: int) -> Columns:

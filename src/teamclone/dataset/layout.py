@@ -1,7 +1,7 @@
 """A dataset on disk: every frame once, samples that point into the frames, all as memory-mapped .npy arrays.
 
-    DS/dataset.json           format number, team, options, matches with their split, cleaning report; ``commands``,
-                              some of REPERTOIRE, where they are others than CLONED
+    DS/dataset.json           format number, team, options, matches with their split and the source of their commands,
+                              cleaning report; ``commands``, some of REPERTOIRE, where they are others than CLONED
     DS/frames/<name>.npy      FRAME_ARRAYS, shape (n_frames, ...), matches in order
     DS/samples/<name>.npy     SAMPLE_ARRAYS, shape (n_samples, ...), ordered by frame, then player
     DS/player_types.npy       (n_matches, n_types, n_fields) float32, fields as `player_types.FIELDS`
@@ -19,7 +19,7 @@ import numpy as np
 
 from teamclone.world.channels import CATEGORICAL, MEASURED
 
-FORMAT = 3
+FORMAT = 4
 """Raised whenever a reader of the old layout would misread the new one."""
 
 
@@ -88,6 +88,13 @@ SAMPLE_ARRAYS = (
         dtype="float32",
         shape=(2,),
         about="the command's arguments as the server uses them (clipped), power, degrees, metres; unused ones 0",
+    ),
+    Array(
+        name="interval",
+        dtype="float16",
+        shape=(2, 2),
+        about="of each argument the ends of its 90 % interval less the argument: 0 of logged commands, infinite "
+        "where nothing is known of it",
     ),
     Array(name="executed", dtype="bool", shape=(), about="the server executed it: the player's counter rose"),
     Array(name="turn_zero", dtype="bool", shape=(), about='a (turn 0), which means "nothing to do"'),

@@ -193,9 +193,11 @@ class Dataset:
     def target(self, rows: Rows) -> Target:
         """Return the commands of samples."""
         rows = torch.as_tensor(rows)
+        recovered = bool(self.meta.get("recovered"))
         return Target(
             kind=self.samples["kind"].index_select(0, rows).long(),
             parameters=self.samples["parameters"].index_select(0, rows),
+            interval=self.samples["interval"].index_select(0, rows).float() if recovered else None,
         )
 
     def last_kind(self, rows: Rows) -> Tensor:

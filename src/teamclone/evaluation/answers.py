@@ -60,7 +60,7 @@ def answers(
     for start in range(0, n, batch):
         part = slice(start, min(n, start + batch))
         with torch.inference_mode():
-            target = None if target_of is None else Target(*(tensor.to(device) for tensor in target_of(part)))
+            target = None if target_of is None else target_of(part).to(device)
             kicks = None if target is None else with_ball(target)
             if kicks_of is not None:
                 kicks = kicks_of(part).to(device)

@@ -78,10 +78,11 @@ def truth(
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64]]:
     """Return kind (n,), issued (n, parameters) and last (n,), see `Predictions`, of samples ``rows`` (n,)."""
     target = dataset.target(rows)
-    kind, arguments = target.kind.numpy(), target.parameters.numpy()
+    kind, arguments, known = target.kind.numpy(), target.parameters.numpy(), target.known.numpy()
     items = parameters_of(dataset.commands)
     issued = np.full((len(rows), len(items)), np.nan, np.float32)
     for column, parameter in enumerate(items):
         carries = kind == dataset.commands.index(parameter.kind.name.lower())
+        carries &= known[:, parameter.argument]
         issued[carries, column] = arguments[carries, parameter.argument]
     return kind, issued, dataset.last_kind(rows).numpy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,10 @@ from torch import Tensor
 
 from teamclone.dataset.clean import COMMAND_COLUMNS, Commands, clean_match, players_to_model
 from teamclone.dynamics import formulas
+from teamclone.dynamics.inverse.columns import recovered_commands
 from teamclone.errors import DatasetError, TeamcloneError, UsageError, choose
 from teamclone.evaluation.answers import Answers, answers
+from teamclone.logs.columns import INTERVALS, Source
 from teamclone.logs.match import Columns, Match
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
@@ -39,8 +42,8 @@ class MatchColumns:
 
     Attributes:
         match_id: of the match. left, right: names of the teams, None for an empty side.
-        frames, players, commands: columns of the match, see ``teamclone.logs.columns``; no commands without a command
-            log.
+        frames, players, commands: columns of the match, see ``teamclone.logs.columns``.
+        source: of the commands; recovered ones have ``columns.INTERVALS``, too.
         types: the columns of ``player_types.FIELDS``. params: the server's parameters.
     """
 
@@ -52,17 +55,26 @@ class MatchColumns:
     commands: Columns
     types: Columns
     params: Mapping[str, float | str]
+    source: Source = Source.LOGGED
 
     @classmethod
     def of(cls, match: Match) -> MatchColumns:
-        """Return the columns of a match that was read from its logs."""
+        """Return the columns of a match that was read from its logs; without a command log, its recovered commands."""
+        game, commands, source = match.game, match.commands, Source.LOGGED
+        if match.log is None:
+            with suppress(UsageError):  # then there are none
+                commands, _ = recovered_commands(
+                    game.frames, game.players, types=game.player_types, params=game.server_params
+                )
+                source = Source.RECOVERED
         return cls(
             match_id=match.match_id,
             left=match.left.name,
             right=match.right.name,
             frames=match.frames,
             players=match.players,
-            commands=match.commands,
+            commands=commands,
+            source=source,
             types=match.game.player_types,
             params=match.game.server_params,
         )
@@ -94,8 +106,9 @@ class PredictionTable:
     Columns: ``match_id``, ``frame`` (index into the log's frames), ``cycle``, ``stoppage``, ``playmode``, ``team``,
     ``side``, ``unum``; ``p_dash``, ... the probability of each command; ``likeliest``, the command with the greatest;
     ``dash_power``, ... the likeliest parameters of each command, if it were given, in power, degrees and metres, those
-    of kicks and tackles null for players that cannot reach the ball; ``done``, the command that the log has, null where
-    it has none that the model knows; ``executed``, whether the server carried it out; ``done_dash_power``, ... its
+    of kicks and tackles null for players that cannot reach the ball; ``done``, the command that was given, null where
+    none is known that the model knows; ``source``, whether a command log has it (``logged``) or the game log alone
+    implies it (``recovered``); ``executed``, whether the server carried it out; ``done_dash_power``, ... its
     parameters; ``log_loss`` of the command, nats; ``parameter_log_loss``, -ln of the density of its parameters, null
     for a model that has none.
     """
@@ -180,7 +193,10 @@ def predict_match(
         return State.of(world, frame[part], actor[part], history=model.inputs.history)
 
     def target_of(part: slice) -> Target:
-        return Target(torch.from_numpy(done.kind[part].clip(min=0)), torch.from_numpy(done.arguments[part]))
+        kind, arguments = torch.from_numpy(done.kind[part].clip(min=0)), torch.from_numpy(done.arguments[part])
+        if match.source is Source.LOGGED:
+            return Target(kind, arguments)
+        return Target(kind, arguments, torch.from_numpy(done.interval[part]))
 
     def kicks_of(part: slice) -> Tensor:
         return torch.from_numpy(np.flatnonzero(near[part] | done.with_ball[part]))
@@ -245,6 +261,7 @@ def _table(
         "likeliest": _words(names, probabilities.argmax(1)),
         **{of.name: _or_null(likeliest[:, index]) for index, of in enumerate(parameters)},
         "done": _words(names, done.kind),
+        "source": _words([source.name.lower() for source in Source], np.where(unknown, -1, match.source)),
         "executed": pa.array(done.executed, mask=unknown),
         **{f"done_{of.name}": _or_null(done.issued[:, index]) for index, of in enumerate(parameters)},
         "log_loss": _or_null(np.where(unknown, np.nan, log_loss)),
@@ -259,12 +276,14 @@ class _Done:
 
     Attributes:
         kind: (n,) int64 index into the model's commands, -1 where the log has none of them.
-        arguments: (n, 2) float32. executed: (n,) bool. issued: (n, parameters) NaN for other commands' parameters.
+        arguments: (n, 2) float32. interval: (n, 2, 2) float32, see `Target`. executed: (n,) bool.
+        issued: (n, parameters) NaN for other commands' parameters and unknown ones.
         with_ball: (n,) bool, a kick or tackle.
     """
 
     kind: NDArray[np.int64]
     arguments: NDArray[np.float32]
+    interval: NDArray[np.float32]
     executed: NDArray[np.bool_]
     issued: NDArray[np.float32]
     with_ball: NDArray[np.bool_]
@@ -279,10 +298,11 @@ def _done(
     commands: tuple[str, ...],
     goalkeepers: bool,
 ) -> _Done:
+    names = {*COMMAND_COLUMNS, *(column.name for column in INTERVALS if match.source is Source.RECOVERED)}
     cleaned = clean_match(
         match.frames,
         match.players,
-        {name: match.commands[name] for name in COMMAND_COLUMNS},
+        {name: values for name, values in match.commands.items() if name in names},
         match.params,
         side=side,
         keep=Commands.RECEIVED,
@@ -297,14 +317,18 @@ def _done(
     here = row >= 0
     row = row[here]
     kind, executed = np.full(len(frame), -1, np.int64), np.zeros(len(frame), np.bool_)
-    arguments = np.zeros((len(frame), 2), np.float32)
-    kind[row], executed[row], arguments[row] = (samples[name][here] for name in ("kind", "executed", "parameters"))
+    arguments, interval = np.zeros((len(frame), 2), np.float32), np.zeros((len(frame), 2, 2), np.float32)
+    kind[row], executed[row] = samples["kind"][here], samples["executed"][here]
+    arguments[row], interval[row] = samples["parameters"][here], samples["interval"][here]
+    known: NDArray[np.bool_] = np.isfinite(interval).all(axis=2)
     issued = np.full((len(frame), len(parameters_of(commands))), np.nan, np.float32)
     for column, of in enumerate(parameters_of(commands)):
-        carries = kind == commands.index(of.kind.name.lower())
+        carries = (kind == commands.index(of.kind.name.lower())) & known[:, of.argument]
         issued[carries, column] = arguments[carries, of.argument]
     with_ball = np.isin(kind, [commands.index(name) for name in ("kick", "tackle")])
-    return _Done(kind=kind, arguments=arguments, executed=executed, issued=issued, with_ball=with_ball)
+    return _Done(
+        kind=kind, arguments=arguments, interval=interval, executed=executed, issued=issued, with_ball=with_ball
+    )
 
 
 def _check(

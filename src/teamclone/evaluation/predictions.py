@@ -21,7 +21,8 @@ class Predictions:
         parameter_log_loss: (n,) -ln of the likelihood of the given command's parameters, nats, per unit of power and
             degree, square metre of a move; NaN from heads without a density, and of commands without parameters.
         kind: (n,) the command given, index into ``commands``.
-        issued: (n, parameters) those of the command given; NaN for those of other commands.
+        issued: (n, parameters) those of the command given; NaN for those of other commands, and where a
+            recovered command's is not known.
         last: (n,) the player's last executed command as an index into ``commands``; -1 for none of them.
         match: (n,) index of the match.
         position: (n, 2) the actor's position, metres, its team attacking +x.

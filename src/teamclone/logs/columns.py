@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 from teamclone.rcss.commands import CommandKind
 
@@ -114,6 +115,24 @@ COMMANDS = (
     _column("arg3", "float32", "", "fourth number; of a two-leg dash the right leg's direction"),
 )
 """One value a received command: shape (n_commands,). The text of a command is ``Match.command_text``."""
+
+INTERVALS = (
+    _column("low0", "float32", "", "of recovered commands the ends of the 90 % interval of `arg0`; else NaN"),
+    _column("high0", "float32", "", "its upper end"),
+    _column("low1", "float32", "", "so too of `arg1`"),
+    _column("high1", "float32", "", "its upper end"),
+)
+"""How well the numbers of a recovered command are known, see `dynamics.inverse`: shape (n_commands,)."""
+
+
+class Source(IntEnum):
+    """Where a command is known from. Ids are stable."""
+
+    LOGGED = 0
+    """A command log."""
+    RECOVERED = 1
+    """The game log alone, by what the command did."""
+
 
 EVENTS = (
     _column("cycle", "int32", "cycle", "server time of the announcement"),

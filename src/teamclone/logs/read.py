@@ -224,7 +224,7 @@ def _bind(first: _Source, second: _Source | None, problems: list[Problem]) -> Ma
             Problem(
                 code="no-command-log",
                 severity=Severity.NOTE,
-                text="no command log (.rcl) beside it: frames only",
+                text="no command log (.rcl) beside it",
                 path=rcg.path,
             )
         )

@@ -77,11 +77,6 @@ def clipped_terms(parts: Mixture, value: Tensor, *, low: float, high: float) -> 
     return torch.where(value[:, None] <= low + CLIPPED, below, terms)
 
 
-def power_terms(parts: Mixture, power: Tensor) -> Tensor:
-    """Return `clipped_terms` of a power in 0..100."""
-    return clipped_terms(parts, power, low=0.0, high=100.0)
-
-
 def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None) -> Tensor:
     """Return (batch, components) the log-likelihood of an angle under each component, wrapped around the circle.
 

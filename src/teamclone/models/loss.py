@@ -58,6 +58,17 @@ def issued(kind: Tensor, commands: tuple[str, ...] = CLONED) -> Tensor:
     return parameter_layout(kind.device, commands)[2] == kind[:, None]
 
 
+def given(target: Target, commands: tuple[str, ...] = CLONED) -> Tensor:
+    """(batch, parameters) bool: those that belong to the command and of which something is known."""
+    argument = parameter_layout(target.kind.device, commands)[1]
+    return issued(target.kind, commands) & target.known.index_select(1, argument)
+
+
+def unknown(target: Target, commands: tuple[str, ...] = CLONED) -> Tensor:
+    """(batch, parameters) bool: those that belong to the command, but nothing is known of them."""
+    return issued(target.kind, commands) & ~given(target, commands)
+
+
 def projected_parameters(target: Target, commands: tuple[str, ...] = CLONED) -> Tensor:
     """(batch, parameters) in [-1, 1]: those of the command given, zero for those of other commands (Table II)."""
     limits, argument, _ = parameter_layout(target.kind.device, commands)
@@ -100,6 +111,8 @@ def point_loss(
     whole = target.kind if whole is None else whole
     cross_entropy = command_loss(logits, target.kind, balance=balance, of=len(whole))
     squared = (projected - projected_parameters(target, commands)).square()
+    if target.interval is not None:
+        squared = torch.where(unknown(target, commands), 0.0, squared)
     if parameter_loss == "masked":
         mse = (squared * issued(target.kind, commands)).sum() / issued(whole, commands).sum()
     else:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from teamclone.errors import TeamcloneError
-from teamclone.logs.columns import COUNTERS, counter_name
+from teamclone.logs.columns import COUNTERS, Source, counter_name
 from teamclone.rcss import pitch, state_bits
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
@@ -230,9 +230,9 @@ CHECKS = (
     ),
     Query(
         name="command-numbers",
-        about="commands of players that the server takes have their numbers",
+        about="logged commands of players that the server takes have their numbers",
         sql=_commands(
-            "valid and unum > 0 and legs = 0 and ("
+            f"valid and unum > 0 and legs = 0 and source = {int(Source.LOGGED)} and ("
             + " or ".join(
                 f"(kind = {int(kind)} and ({' or '.join(f'arg{place} is null' for place in range(count))}))"
                 for kind, count in _NUMBERS.items()

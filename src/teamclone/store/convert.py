@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -14,7 +15,10 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from teamclone import __version__
-from teamclone.logs import Problem
+from teamclone.dynamics.inverse.columns import recovered_commands
+from teamclone.errors import UsageError
+from teamclone.logs import Problem, Severity, columns
+from teamclone.logs.columns import Source
 from teamclone.logs.match import Columns, Match
 from teamclone.rcss.players import N_PLAYERS, SLOT_SIDES, SLOT_UNUMS
 from teamclone.rcss.playmodes import PlayMode
@@ -46,16 +50,22 @@ def sources_of(match: Match) -> Sources:
     )
 
 
-def tables_of(match: Match) -> Tables:
-    """Return all rows of a match."""
+def tables_of(match: Match, *, recover: bool = True) -> Tables:
+    """Return all rows of a match.
+
+    Args:
+        match: from its logs.
+        recover: give a match without a command log the commands that its game log implies.
+    """
+    commands, problems = command_columns(match, recover=recover)
     made = {
         schema.FRAMES: frame_columns(match),
         schema.PLAYER_STATES: player_columns(match),
-        schema.COMMANDS: {**match.commands, "text": command_texts(match)},
+        schema.COMMANDS: commands,
         schema.PLAYER_TYPES: type_columns(match),
         schema.PARAMETERS: parameter_columns(match),
         schema.EVENTS: {**match.events, "text": list(match.event_texts)},
-        schema.PROBLEMS: problem_columns(match),
+        schema.PROBLEMS: problem_columns((*match.problems, *problems)),
     }
     tables = {table.name: arrow_table(table, values, match_id=match.match_id) for table, values in made.items()}
     tables[schema.MATCHES.name] = arrow_table(schema.MATCHES, match_columns(match, tables), match_id=match.match_id)
@@ -159,9 +169,37 @@ def parameter_columns(match: Match) -> dict[str, Any]:
     }
 
 
-def problem_columns(match: Match) -> dict[str, Any]:
+def command_columns(match: Match, *, recover: bool) -> tuple[dict[str, Any], list[Problem]]:
+    """Return the columns of ``commands``, (n_commands,), and problems: what a game log alone cannot give."""
+    source, found, problems = Source.LOGGED, match.commands, []
+    if recover and match.log is None:
+        try:
+            game = match.game
+            found, gaps = recovered_commands(
+                game.frames, game.players, types=game.player_types, params=game.server_params
+            )
+            source = Source.RECOVERED
+            problems = [_gap(match, f"the game log alone does not give {gap}") for gap in gaps]
+        except UsageError as error:
+            problems = [_gap(match, f"no commands from the game log alone: {error}")]
+        except Exception as error:  # a defect of the physics must not cost the match
+            what = f"{type(error).__name__}: {error}"
+            problems = [_gap(match, f"no commands from the game log alone ({what}); please report this file")]
+    n_commands = len(found["cycle"])
+    made: dict[str, Any] = {column.name: np.full(n_commands, np.nan, np.float32) for column in columns.INTERVALS}
+    made |= found
+    made["source"] = np.full(n_commands, source, np.int8)
+    made["text"] = [""] * n_commands if source is Source.RECOVERED else command_texts(match)
+    return made, problems
+
+
+def _gap(match: Match, text: str) -> Problem:
+    return Problem(code="not-recovered", severity=Severity.NOTE, text=text, path=match.rcg_path)
+
+
+def problem_columns(problems: Iterable[Problem]) -> dict[str, Any]:
     """Return the columns of ``problems``: (n_problems,), by file and place."""
-    problems = sorted(match.problems, key=_place)
+    problems = sorted(problems, key=_place)
     return {
         "code": [problem.code for problem in problems],
         "severity": [str(problem.severity) for problem in problems],

@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import pyarrow.compute as pc
+
 from teamclone.dynamics.audit import Audit, audit, rules_of
 from teamclone.dynamics.logged import Logged
 from teamclone.errors import UsageError
+from teamclone.logs import columns
+from teamclone.logs.columns import Source
 from teamclone.store import convert, schema
 from teamclone.store.checks import Check, Finding
 
@@ -51,12 +55,13 @@ def check_physics(tables: Mapping[str, pa.Table]) -> tuple[Physics, list[Finding
 
 
 def _logged(tables: Mapping[str, pa.Table]) -> Logged:
-    commands = tables[schema.COMMANDS.name]
+    # Recovered commands follow from the physics: to compare them with it says nothing.
+    commands = tables[schema.COMMANDS.name].filter(pc.field("source") == Source.LOGGED)
     text = commands.column("text")
     return Logged.of_columns(
         convert.numpy_columns(schema.FRAMES, tables[schema.FRAMES.name]),
         convert.numpy_columns(schema.PLAYER_STATES, tables[schema.PLAYER_STATES.name]),
-        convert.numpy_columns(schema.COMMANDS, commands.drop_columns(["text"])),
+        convert.numpy_columns(schema.COMMANDS, commands.select([column.name for column in columns.COMMANDS])),
         lambda index: text[index].as_py() or "",
     )
 

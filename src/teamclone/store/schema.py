@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from teamclone.errors import StoreError, UsageError, choose
 from teamclone.logs import columns
-from teamclone.logs.columns import Column
+from teamclone.logs.columns import Column, Source
 from teamclone.rcss import player_types
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
@@ -21,7 +21,7 @@ from teamclone.system import documents
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FORMAT = 1
+FORMAT = 2
 """Raised whenever a reader of the old tables would misread the new ones."""
 
 SIGNED = {"uint8": "int16", "uint16": "int32", "uint32": "int64"}
@@ -179,11 +179,17 @@ PLAYER_STATES = Table(
 
 COMMANDS = Table(
     name="commands",
-    about="One row a command that the server received, in the order of the command log.",
+    about=(
+        "One row a command that the server received, in the order of the command log. Of a match without one, the "
+        "commands that the game log alone implies: those that the server executed of dash, turn, kick, tackle, catch, "
+        "move and turn_neck; `line` then counts them."
+    ),
     key=("match_id", "line", "side", "unum", "order"),
     fields=(
         MATCH_ID,
         *_logged(columns.COMMANDS),
+        _field("source", "int8", "", "where it is known from, see the command_sources table"),
+        *_logged(columns.INTERVALS),
         _field("text", "string", "", "its text besides numbers: the payload of say, `our 9` of attentionto"),
     ),
     order='line, side, unum, "order"',
@@ -277,11 +283,16 @@ PLAYMODES = _names("playmodes", "The play modes.", tuple((int(mode), mode.name.l
 COMMAND_KINDS = _names(
     "command_kinds", "The kinds of commands.", tuple((int(kind), kind.name.lower()) for kind in CommandKind)
 )
+COMMAND_SOURCES = _names(
+    "command_sources",
+    "Where commands are known from: a command log, or the game log alone.",
+    tuple((int(source), source.name.lower()) for source in Source),
+)
 
 MATCH_TABLES = (MATCHES, FRAMES, PLAYER_STATES, COMMANDS, PLAYER_TYPES, PARAMETERS, EVENTS, PROBLEMS)
 """The tables that every match fills."""
 
-TABLES = (*MATCH_TABLES, PLAYMODES, COMMAND_KINDS)
+TABLES = (*MATCH_TABLES, PLAYMODES, COMMAND_KINDS, COMMAND_SOURCES)
 
 BY_NAME = {table.name: table for table in TABLES}
 

@@ -99,7 +99,7 @@ def _dead(task: LogPair | tuple[str, str]) -> MatchCheck:
 def _validate_pair(pair: LogPair, *, physics: bool) -> MatchCheck:
     try:
         match = read_pair(pair)
-        compared, findings = _check(convert.tables_of(match), physics=physics)
+        compared, findings = _check(convert.tables_of(match, recover=False), physics=physics)
     except LogError as error:
         return MatchCheck(name=str(pair.path), error=str(error))
     except OSError as error:

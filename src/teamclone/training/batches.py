@@ -146,8 +146,7 @@ class Batches:
                 inputs, target, whole = made.pop().result()
                 if part is not None:
                     made = [pool.submit(self._batch, rows[part], mirrored_in(part))]
-                target = Target(*(tensor.to(self.device) for tensor in target))
-                yield Batch(inputs.to(self.device), target, whole.to(self.device))
+                yield Batch(inputs.to(self.device), target.to(self.device), whole.to(self.device))
 
     @torch.no_grad()
     def _batch(self, rows: NDArray[np.int64] | Tensor, mirrored: NDArray[np.bool_] | None = None) -> Batch:
@@ -160,12 +159,20 @@ class Batches:
         if mirrored is None:
             return Batch(self.inputs.normalise(self._columns(share)), target, whole)
         turned = torch.from_numpy(mirrored[mine])[:, None]
-        other = mirror_target(target, self.dataset.commands).parameters
-        target = target._replace(parameters=torch.where(turned.to(other.device), other, target.parameters))
+        target = _where(turned, mirror_target(target, self.dataset.commands), target)
         turned = turned.to(self.device)
         columns = self._columns(share) * torch.where(turned, self.inputs.signs, 1.0)
         columns[:, self.moved] = torch.where(turned, columns[:, self.order], columns[:, self.moved])
         return Batch(self.inputs.normalise(columns), target, whole)
+
+
+def _where(mask: Tensor, one: Target, other: Target) -> Target:
+    """Return the commands of ``one`` where ``mask`` (batch, 1) is true, else those of ``other``; kinds are the same."""
+    mask = mask.to(one.parameters.device)
+    interval = other.interval
+    if one.interval is not None and interval is not None:
+        interval = torch.where(mask[..., None], one.interval, interval)
+    return Target(other.kind, torch.where(mask, one.parameters, other.parameters), interval)
 
 
 class _Cache:

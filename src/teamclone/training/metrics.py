@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from teamclone.models.answer import Prediction
-from teamclone.models.loss import Loss, issued, parameter_layout, projected_parameters
+from teamclone.models.loss import Loss, given, parameter_layout, projected_parameters, unknown
 from teamclone.rcss.commands import CLONED
 from teamclone.training.group import ALONE, Group
 from teamclone.world.state import Target
@@ -25,9 +25,11 @@ class RunningMetrics:
     @torch.no_grad()
     def add(self, loss: Loss, prediction: Prediction, target: Target, *, batch: int | None = None) -> None:
         """Count one batch, or a process's share of a ``batch`` of so many samples."""
-        mask = issued(target.kind, self.commands)
+        mask = given(target, self.commands)
         limits = parameter_layout(mask.device, self.commands)[0]
         error = (prediction.parameters / limits - projected_parameters(target, self.commands)).abs()
+        if target.interval is not None:
+            error = torch.where(unknown(target, self.commands), 0.0, error)
         n = len(mask) if batch is None else batch
         parts = (
             loss.total * n,

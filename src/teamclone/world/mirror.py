@@ -53,7 +53,11 @@ def mirror_state(state: State, places: Tensor) -> State:
 
 def mirror_target(target: Target, commands: tuple[str, ...] = CLONED) -> Target:
     """Return the commands reflected: turn moments, directions and the y of places negated."""
-    return Target(target.kind, target.parameters * _arguments(commands).to(target.parameters)[target.kind])
+    signs = _arguments(commands).to(target.parameters)[target.kind]
+    interval = target.interval
+    if interval is not None:
+        interval = torch.where(signs[..., None] > 0, interval, -interval.flip(2))
+    return Target(target.kind, target.parameters * signs, interval)
 
 
 def mirror_places(mean: NDArray[np.floating]) -> Tensor:

@@ -125,7 +125,27 @@ class Target(NamedTuple):
     Attributes:
         kind: (batch,) int64 index into the dataset's commands.
         parameters: (batch, 2) power, degrees and metres.
+        interval: (batch, 2, 2) the ends of the 90 % interval of each parameter less the parameter, infinite where
+            nothing is known of it; None where all commands were logged, and so are known exactly.
     """
 
     kind: Tensor
     parameters: Tensor
+    interval: Tensor | None = None
+
+    def to(self, device: torch.device) -> Target:
+        """Return the commands in the memory of a device."""
+        interval = None if self.interval is None else self.interval.to(device, non_blocking=True)
+        return Target(self.kind.to(device, non_blocking=True), self.parameters.to(device, non_blocking=True), interval)
+
+    def select(self, rows: Tensor) -> Target:
+        """Return some of the commands: indices or a mask."""
+        interval = None if self.interval is None else self.interval[rows]
+        return Target(self.kind[rows], self.parameters[rows], interval)
+
+    @property
+    def known(self) -> Tensor:
+        """(batch, 2) bool, whether anything is known of each parameter."""
+        if self.interval is None:
+            return torch.ones_like(self.parameters, dtype=torch.bool)
+        return torch.isfinite(self.interval).all(2)

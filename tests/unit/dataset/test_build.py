@@ -24,7 +24,7 @@ import pytest
 import torch
 
 from disk import small_disk
-from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset, is_current
+from teamclone.dataset.build import DatasetConfig, Sources, SplitBy, build_dataset, is_current
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import ClusterError, DatasetError, StoreError, UsageError
@@ -101,7 +101,7 @@ def test_the_same_bytes_wherever_matches_are_cleaned(
     with Backwards(MATCHES) as executor:
         reports.append(build_dataset(config, store=store, out=tmp_path / "any", executor=executor))
     one = content(tmp_path / "one")
-    assert len(one) == 19
+    assert len(one) == 20
     for name, report in zip(("two", "any"), reports[1:], strict=True):
         assert content(tmp_path / name) == one
         assert report == reports[0]
@@ -276,6 +276,76 @@ def test_goalkeepers_need_a_split_by_match(store: Store, config: DatasetConfig, 
 def test_teams_that_cannot_be_pooled(store: Store, tmp_path: Path, teams: tuple[str, ...], message: str) -> None:
     with pytest.raises(UsageError, match=message):
         build_dataset(DatasetConfig(teams=teams), store=store, out=tmp_path / "ds", jobs=1)
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory, fixtures_dir: Path) -> Store:
+    """Three matches with a command log, three without, and three in which nobody plays."""
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match = read_match(log)
+    alone = dataclasses.replace(match, log=None, rcl_path=None)
+    mode = match.frames | {"playmode": np.full_like(match.frames["playmode"], 1)}
+    idle = dataclasses.replace(match, game=dataclasses.replace(match.game, frames=mode))
+    made = create_store(tmp_path_factory.mktemp("mixed") / "store")
+    for number, one in enumerate((match, alone, idle) * 3):
+        made.add(dataclasses.replace(one, match_id=f"{number:016x}"))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("source", "sources", "without"),
+    [
+        (Sources.ANY, ["logged", "recovered"] * 3, 3),
+        (Sources.LOGGED, ["logged"] * 3, 6),
+        (Sources.RECOVERED, ["recovered"] * 6, 3),
+    ],
+)
+def test_sources_of_commands(mixed: Store, tmp_path: Path, source: Sources, sources: list[str], without: int) -> None:
+    config = DatasetConfig(teams=(TEAM,), source=source)
+    report = build_dataset(config, store=mixed, out=tmp_path / "ds", jobs=1)
+    assert [match["source"] for match in report["matches"]] == sources
+    # Every split has rows: those without commands are in none.
+    assert len(report["matches_without_commands"]) == 1  # the three have one name
+    assert len(mixed.match_ids()) - len(report["matches"]) == without
+    assert all(sum(report["rows"][split].values()) for split in ("train", "validation", "test"))
+    dataset = open_dataset(tmp_path / "ds")
+    assert is_current(tmp_path / "ds", config, mixed)
+    target = dataset.target(np.arange(len(dataset)))
+    if source is Sources.LOGGED:
+        assert target.interval is None
+        assert report["recovered"] == 0
+        return
+    assert target.interval is not None
+    assert torch.isfinite(target.parameters).all()
+    match = dataset.match(np.arange(len(dataset)))
+    recovered = torch.tensor([row["source"] == "recovered" for row in dataset.matches])[match]
+    assert report["recovered"] == int(recovered.sum())
+    assert (target.interval[~recovered] == 0).all()
+    assert (target.interval[recovered][..., 0] <= 0).all()
+    assert (target.interval[recovered][..., 1] >= 0).all()
+    dashes = recovered & (target.kind == 0)
+    width = target.interval[dashes, 0, 1] - target.interval[dashes, 0, 0]
+    assert 0 < float(width.median()) < 1
+
+
+def test_recovered_when_ingested_or_when_cleaned_is_the_same(
+    mixed: Store, config: DatasetConfig, tmp_path: Path
+) -> None:
+    report = build_dataset(
+        dataclasses.replace(config, source=Sources.RECOVERED), store=mixed, out=tmp_path / "ds", jobs=1
+    )
+    first, second, *_ = report["matches"]  # of a store with and without the command log
+    for name in ("frames", "rows", "executed", "turn_zero", "idle"):
+        assert first[name] == second[name]
+
+
+def test_nothing_but_matches_without_commands(mixed: Store, config: DatasetConfig, tmp_path: Path) -> None:
+    made = create_store(tmp_path / "store")
+    (log,) = (Path(__file__).parents[2] / "data" / "fixtures" / "v6").glob("*.rcg.gz")
+    made.add(dataclasses.replace(read_match(log), log=None, rcl_path=None))
+    with pytest.raises(DatasetError, match="no match has any"):
+        build_dataset(dataclasses.replace(config, source=Sources.LOGGED), store=made, out=tmp_path / "ds", jobs=1)
+    assert not (tmp_path / "ds").exists()
 
 
 def test_memory_does_not_grow_with_the_matches(store: Store, config: DatasetConfig, tmp_path: Path) -> None:

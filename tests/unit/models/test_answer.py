@@ -16,13 +16,13 @@ from teamclone.models.config import EgocentricConfig, ModelConfig, PaperConfig
 from teamclone.models.distributions import (
     Mixture,
     angle_terms,
+    clipped_terms,
     draw_angle,
     draw_component,
     draw_direction,
     draw_value,
     log_class,
     log_likelihood,
-    power_terms,
 )
 from teamclone.models.heads.ensemble import EnsembleAnswer
 from teamclone.models.heads.point import POINT_SCALE, PointAnswer
@@ -98,6 +98,20 @@ def density(parts: Mixture, grid: Tensor, factor: float = 1.0) -> Tensor:
     return log_likelihood(row.logits, angle_terms(row, grid, factor=torch.full_like(grid, factor))).exp()
 
 
+@EVERY
+def test_narrow_intervals_have_the_likelihood_of_numbers(config: ModelConfig) -> None:
+    n = 12 * len(REPERTOIRE)
+    answer, source = answer_to_one(config, n), generator(5)
+    kind = torch.arange(n) % len(REPERTOIRE)
+    parameters = 25 * torch.rand(n, 2, generator=source) + 5
+    exact = answer.log_likelihood(Target(kind, parameters))
+    narrow = answer.log_likelihood(Target(kind, parameters, torch.zeros(n, 2, 2)))
+    torch.testing.assert_close(narrow, exact, rtol=1e-3, atol=5e-3)
+    unknown = torch.tensor([-math.inf, math.inf]).expand(n, 2, 2)
+    nothing = answer.log_likelihood(Target(kind, torch.zeros(n, 2), unknown))
+    torch.testing.assert_close(nothing, torch.zeros(n), rtol=0, atol=1e-5)
+
+
 def test_angles_are_drawn_from_their_density_around_the_circle() -> None:
     parts = same([0.0, 1.0, -1.0], [-3.0, 0.5, 2.0], [0.3, 0.05, 2.5])
     source = generator()
@@ -131,7 +145,7 @@ def test_powers_are_clipped_as_the_density_counts_them() -> None:
     for bound in (0.0, 100.0):
         row = Mixture(*(part[:1] for part in parts))
         value = torch.tensor([bound], dtype=torch.float64)
-        expected = float(log_likelihood(row.logits, power_terms(row, value)).exp())
+        expected = float(log_likelihood(row.logits, clipped_terms(row, value, low=0.0, high=100.0)).exp())
         assert expected > 0.1
         assert float((power == bound).double().mean()) == pytest.approx(expected, abs=4 * math.sqrt(expected / N))
     inside = power[(power > 0) & (power < 100)]

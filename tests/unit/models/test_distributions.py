@@ -20,7 +20,6 @@ from teamclone.models.distributions import (
     log_likelihood,
     merged,
     mirrored,
-    power_terms,
     scale_of,
     weighted_medoid,
     weighted_medoid_place,
@@ -43,7 +42,9 @@ def double(*values: float) -> Tensor:
 
 
 def power_likelihood(parts: Mixture, power: Tensor) -> Tensor:
-    return log_likelihood(repeated(parts, len(power)).logits, power_terms(repeated(parts, len(power)), power)).exp()
+    return log_likelihood(
+        repeated(parts, len(power)).logits, clipped_terms(repeated(parts, len(power)), power, low=0.0, high=100.0)
+    ).exp()
 
 
 def angle_likelihood(parts: Mixture, degrees: Tensor, factor: float | None = None) -> Tensor:
@@ -257,7 +258,7 @@ def test_likelihoods_and_gradients_are_numbers_at_the_extremes(raw: float, centr
     scales = torch.tensor([[raw, 0.0]], requires_grad=True)
     for value in (0.0, 1e-3, 57.3, 99.999, 100.0):
         one = Mixture(logits, centres, scale_of(scales, least=LEAST_POWER, typical=3.0))
-        loss = log_likelihood(one.logits, power_terms(one, torch.tensor([value])))
+        loss = log_likelihood(one.logits, clipped_terms(one, torch.tensor([value]), low=0.0, high=100.0))
         gradients = torch.autograd.grad(loss.sum(), (logits, centres, scales))
         assert loss.isfinite().all()
         assert all(gradient.isfinite().all() for gradient in gradients)
@@ -280,7 +281,7 @@ def test_the_likeliest_mixture_is_found() -> None:
     for _ in range(300):
         parts = Mixture(raw[:, 0][None], raw[:, 1][None], scale_of(raw[:, 2][None], least=LEAST_POWER, typical=3.0))
         many = repeated(parts, len(power))
-        loss = -log_likelihood(many.logits, power_terms(many, power)).mean()
+        loss = -log_likelihood(many.logits, clipped_terms(many, power, low=0.0, high=100.0)).mean()
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()

@@ -39,7 +39,7 @@ def test_parameters_take_the_places_of_table_two() -> None:
 def test_the_papers_loss_by_hand() -> None:
     logits = torch.log(torch.tensor([[0.7, 0.1, 0.1, 0.1], [0.25, 0.25, 0.25, 0.25]]))
     predicted = torch.tensor([[0.5, 0.1, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.25, 0.0, 0.0, -0.3]])
-    target = Target(*(part[:2] for part in TARGET))
+    target = TARGET.select(torch.arange(2))
     loss = point_loss(logits, predicted, target)
     # Row 0: dash direction off by .6, turn moment .2 where zero is asked; row 1: tackle direction -.3 likewise.
     mse = (0.6**2 + 0.2**2 + 0.3**2) / 12
@@ -50,7 +50,7 @@ def test_the_papers_loss_by_hand() -> None:
 
 def test_masked_loss_looks_at_issued_parameters_only() -> None:
     predicted = torch.tensor([[0.5, 0.1, 0.2, 0.0, 0.0, 0.0], [0.0, 0.0, 0.35, 0.0, 0.0, -0.3]])
-    target = Target(*(part[:2] for part in TARGET))
+    target = TARGET.select(torch.arange(2))
     loss = point_loss(torch.zeros(2, 4), predicted, target, parameter_loss="masked")
     # Three parameters were issued: dash power exact, dash direction off by .6, turn moment by .1.
     assert float(loss.parameters) == pytest.approx((0.6**2 + 0.1**2) / 3)
@@ -91,7 +91,7 @@ def test_losses_of_shares_add_up_to_that_of_the_batch(parameter_loss: ParameterL
 
 def test_the_mixtures_loss_by_hand() -> None:
     logits = torch.log(torch.tensor([[0.7, 0.1, 0.1, 0.1], [0.25, 0.25, 0.25, 0.25]]))
-    target = Target(*(part[:2] for part in TARGET))
+    target = TARGET.select(torch.arange(2))
     likelihood, to_targets = torch.tensor([-1.0, -3.0]), torch.tensor([0.0, -8.0])
     cross_entropy = -(log(0.7) + log(0.25)) / 2
     loss = mixture_loss(logits, likelihood, target, to_targets=to_targets, weight=0.5, target_weight=0.1)
@@ -121,7 +121,7 @@ def test_the_mixtures_loss_by_hand() -> None:
 def test_a_balanced_cross_entropy_by_hand() -> None:
     logits = torch.log(torch.tensor([[0.5, 0.2, 0.2, 0.1], [0.25, 0.25, 0.25, 0.25]]))
     balance = Balance(torch.tensor([0.5, 3.0, 1.0, 1.0]), torch.log(torch.tensor([1.0, 2.0, 1.0, 1.0])))
-    loss = point_loss(logits, torch.zeros(2, 6), Target(*(part[:2] for part in TARGET)), balance=balance)
+    loss = point_loss(logits, torch.zeros(2, 6), TARGET.select(torch.arange(2)), balance=balance)
     # Shifted, the first row is .5 .4 .2 .1 of 1.2, the second 1 2 1 1 of 5.
     assert float(loss.cross_entropy) == pytest.approx(-(0.5 * log(0.5 / 1.2) + 3 * log(2 / 5)) / 2)
 

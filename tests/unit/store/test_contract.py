@@ -254,11 +254,58 @@ def test_adding_again_changes_nothing(store: Store, match: Match) -> None:
 def test_commands_that_come_later_complete_a_match(store: Store, match: Match) -> None:
     alone = dataclasses.replace(match, log=None, rcl_path=None)
     assert store.add(alone) is Added.ADDED
-    assert store.matches()["n_commands"].to_pylist() == [0]
+    executed = store.matches()["n_commands"].to_pylist()[0]
+    assert 0 < executed < len(match.commands["cycle"])
     assert store.add(match) is Added.REPLACED
     assert store.matches()["n_commands"].to_pylist() == [len(match.commands["cycle"])]
     assert store.add(alone) is Added.UNCHANGED
     assert store.matches()["n_commands"].to_pylist() == [len(match.commands["cycle"])]
+
+
+def test_without_a_command_log_the_game_log_gives_commands(store: Store, match: Match) -> None:
+    store.add(match)
+    alone = dataclasses.replace(match, match_id="0" * 16, log=None, rcl_path=None)
+    store.add(alone)
+    logged, recovered = (
+        store.sql(
+            "select c.frame, c.side, c.unum, k.name as kind, c.arg0, c.low0, c.high0 from commands c "
+            "join command_kinds k on c.kind = k.id join command_sources s on c.source = s.id "
+            f"where s.name = '{source}' and match_id = '{match_id}' and k.name in ('dash', 'turn', 'kick') "
+            "and unum > 0 order by c.line"
+        )
+        for source, match_id in (("logged", match.match_id), ("recovered", alone.match_id))
+    )
+    assert recovered.num_rows > 0.6 * logged.num_rows  # the others have no frame, or were not executed
+    keys = ("frame", "side", "unum", "kind")
+    sent = set(zip(*(logged[name].to_pylist() for name in keys), strict=True))
+    assert sent.issuperset(zip(*(recovered[name].to_pylist() for name in keys), strict=True))
+    assert logged["low0"].null_count == logged["high0"].null_count == logged.num_rows
+    assert recovered["arg0"].null_count < 0.01 * recovered.num_rows
+    assert recovered["low0"].null_count == recovered["arg0"].null_count
+    assert [row["n_problems"] for row in store.matches().to_pylist()] == [len(alone.problems), len(match.problems)]
+
+
+def test_what_a_game_log_cannot_give_is_a_note(store: Store, fixtures_dir: Path) -> None:
+    (log,) = (fixtures_dir / "native-v2").glob("*.rcg*")
+    match = dataclasses.replace(read_match(log), log=None, rcl_path=None)
+    store.add(match)
+    found = store.read_table(match.match_id, "problems").to_pylist()
+    notes = [row["text"] for row in found if row["code"] == "not-recovered"]
+    assert notes
+    assert all(note.startswith("the game log alone does not give ") for note in notes)
+    assert {row["severity"] for row in found if row["code"] == "not-recovered"} == {"note"}
+
+
+def test_a_defect_of_the_physics_costs_no_match(store: Store, match: Match, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*arguments: object, **options: object) -> None:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(convert, "recovered_commands", fails)
+    alone = dataclasses.replace(match, log=None, rcl_path=None)
+    assert store.add(alone) is Added.ADDED
+    assert store.matches()["n_commands"].to_pylist() == [0]
+    texts = store.read_table(match.match_id, "problems")["text"].to_pylist()
+    assert any("ZeroDivisionError: by zero" in text for text in texts)
 
 
 def test_removing(store: Store, match: Match) -> None:

@@ -56,9 +56,18 @@ def test_mirroring_twice_is_nothing(state: State) -> None:
     twice = mirror_state(mirror_state(state, PLACES), PLACES)
     for one, other in zip(state, twice, strict=True):
         assert torch.equal(one, other)
-    target = Target(torch.arange(4), torch.tensor([[50.0, -90.0], [45.0, 0.0], [100.0, 180.0], [-18.0, 0.0]]))
+    parameters = torch.tensor([[50.0, -90.0], [45.0, 0.0], [100.0, 180.0], [-18.0, 0.0]])
+    target = Target(torch.arange(4), parameters, torch.linspace(-1.0, 2.0, 16).view(4, 2, 2))
     for one, other in zip(target, mirror_target(mirror_target(target)), strict=True):
         assert torch.equal(one, other)
+
+
+def test_intervals_change_sides_with_their_parameters() -> None:
+    interval = torch.tensor([[[-1.0, 2.0], [-3.0, 4.0]], [[-5.0, 6.0], [-torch.inf, torch.inf]]])
+    target = mirror_target(Target(torch.tensor([0, 1]), torch.tensor([[50.0, 10.0], [20.0, 0.0]]), interval))
+    assert target.interval is not None
+    assert target.interval.tolist() == [[[-1, 2], [-4, 3]], [[-6, 5], [-torch.inf, torch.inf]]]
+    assert target.known.tolist() == [[True, True], [True, False]]
 
 
 def test_a_mirrored_state_by_hand(state: State) -> None:

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.models import distributions as mixture
+from teamclone.models import intervals
 from teamclone.models.answer import Answer, Prediction
 from teamclone.models.distributions import (
     DEGREE,
@@ -360,7 +361,7 @@ class MixtureHead(nn.Module):
         answers = of.kick if self.training else (_mean_kick(of.kick),)
         to_targets = mixture.log_likelihood(
             of.turn_to_targets.logits,
-            mixture.angle_terms(of.turn_to_targets, target.parameters[:, 0], factor=of.turn_factor),
+            _Number.of(target, 0).angle_terms(of.turn_to_targets, factor=of.turn_factor),
         )
         return mixture_loss(
             of.logits,
@@ -376,7 +377,7 @@ class MixtureHead(nn.Module):
     @staticmethod
     def kick_loss(kicks: Sequence[KickAnswer], target: Target, *, of: int) -> Tensor:
         """Return the error of kicks and tackles alone, summed and divided by ``of``; each answer counts by itself."""
-        likelihood = _kick_likelihood(kicks, target.parameters)
+        likelihood = _kick_likelihood(kicks, target)
         kind = (target.kind == WITH_BALL[1]).long()
         return -likelihood.gather(1, kind[:, None]).sum() / of
 
@@ -406,32 +407,62 @@ def _spread(values: Tensor, output: ActionDistribution) -> Tensor:
     return values.new_zeros(output.logits.shape[0], *values.shape[1:]).index_copy(0, output.kick_rows, values)
 
 
-def _kick_likelihood(answers: Sequence[KickAnswer], parameters: Tensor) -> Tensor:
-    """(kicks, 2) log-likelihood of (kicks, 2) parameters as those of a kick and of a tackle, the mean of answers."""
-    first, second = parameters[:, 0], parameters[:, 1]
+class _Number(NamedTuple):
+    """One number of each command: (batch,) what it is; (batch, 2) ends of its interval, None where it is exact."""
+
+    value: Tensor
+    span: Tensor | None
+
+    @classmethod
+    def of(cls, target: Target, index: int) -> _Number:
+        """Return the first or second number of commands."""
+        value = target.parameters[:, index]
+        return cls(value, None if target.interval is None else value[:, None] + target.interval[:, index])
+
+    def clipped_terms(self, parts: Mixture, *, low: float, high: float) -> Tensor:
+        """Return `distributions.clipped_terms` of it."""
+        if self.span is None:
+            return mixture.clipped_terms(parts, self.value, low=low, high=high)
+        return intervals.clipped_terms(parts, self.span, low=low, high=high)
+
+    def angle_terms(self, parts: Mixture, *, factor: Tensor | None = None) -> Tensor:
+        """Return `distributions.angle_terms` of it."""
+        if self.span is None:
+            return mixture.angle_terms(parts, self.value, factor=factor)
+        return intervals.angle_terms(parts, self.span, factor=factor)
+
+    def log_class(self, logits: Tensor) -> Tensor:
+        """Return `distributions.log_class` of it."""
+        return log_class(logits, self.value) if self.span is None else intervals.log_class(logits, self.span)
+
+
+def _kick_likelihood(answers: Sequence[KickAnswer], target: Target) -> Tensor:
+    """(kicks, 2) log-likelihood of the numbers of (kicks,) commands as those of a kick and of a tackle.
+
+    It is the mean of the answers.
+    """
+    first, second = _Number.of(target, 0), _Number.of(target, 1)
     each = []
     for kick in answers:
-        terms = mixture.power_terms(kick.power, first) + mixture.angle_terms(kick.direction, second)
-        both = [mixture.log_likelihood(kick.power.logits, terms), log_class(kick.tackle, first)]
+        terms = first.clipped_terms(kick.power, low=0.0, high=100.0) + second.angle_terms(kick.direction)
+        both = [mixture.log_likelihood(kick.power.logits, terms), first.log_class(kick.tackle)]
         each.append(torch.stack(both, 1))
     return torch.stack(each).mean(0)
 
 
 def _chosen(output: ActionDistribution, target: Target, answers: Sequence[KickAnswer]) -> Tensor:
     """(batch,) log-likelihood of the parameters of the command given, of a kick as the mean of ``answers``."""
-    of_kicks = target.parameters if output.kick_rows is None else target.parameters[output.kick_rows]
+    of_kicks = target if output.kick_rows is None else target.select(output.kick_rows)
     kick = _spread(_kick_likelihood(answers, of_kicks), output)
-    first, second = target.parameters[:, 0], target.parameters[:, 1]
-    dash = mixture.log_likelihood(output.dash_power.logits, mixture.power_terms(output.dash_power, first))
-    turn = mixture.log_likelihood(
-        output.turn.logits, mixture.angle_terms(output.turn, first, factor=output.turn_factor)
-    )
-    terms = [dash + log_class(output.dash_direction, second), turn, kick[:, 0], kick[:, 1]]
+    first, second = _Number.of(target, 0), _Number.of(target, 1)
+    dash = mixture.log_likelihood(output.dash_power.logits, first.clipped_terms(output.dash_power, low=0.0, high=100.0))
+    turn = mixture.log_likelihood(output.turn.logits, first.angle_terms(output.turn, factor=output.turn_factor))
+    terms = [dash + second.log_class(output.dash_direction), turn, kick[:, 0], kick[:, 1]]
     if output.catch is not None:
-        terms.append(log_class(output.catch, first))
+        terms.append(first.log_class(output.catch))
     if output.move is not None:
-        x = mixture.clipped_terms(output.move.x, first, low=-pitch.MAX_X, high=pitch.MAX_X)
-        y = mixture.clipped_terms(output.move.y, second, low=-pitch.MAX_Y, high=pitch.MAX_Y)
+        x = first.clipped_terms(output.move.x, low=-pitch.MAX_X, high=pitch.MAX_X)
+        y = second.clipped_terms(output.move.y, low=-pitch.MAX_Y, high=pitch.MAX_Y)
         terms.append(mixture.log_likelihood(output.move.x.logits, x + y))
     terms += [torch.zeros_like(dash)] * (output.logits.shape[1] - len(terms))  # none has no parameters
     by_kind = torch.stack(terms, 1)

@@ -15,6 +15,7 @@ from teamclone.models.loss import (
     Balance,
     Loss,
     ParameterLoss,
+    given,
     issued,
     parameter_layout,
     point_loss,
@@ -58,7 +59,7 @@ class PointAnswer(Answer):
         away = torch.where(angle, torch.remainder(away + 1, 2) - 1, away)
         scale = POINT_SCALE * self.limits
         each = -(away / POINT_SCALE).square() / 2 - torch.log(scale) - math.log(2 * math.pi) / 2
-        return torch.where(issued(target.kind, self.commands), each, 0.0).sum(1)
+        return torch.where(given(target, self.commands), each, 0.0).sum(1)
 
     def draw_parameters(self, kind: Tensor, generator: torch.Generator | None) -> Tensor:
         """Return (batch, 2) predicted parameters of these commands; nothing is drawn."""

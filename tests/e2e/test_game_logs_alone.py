@@ -19,6 +19,7 @@ SMALL = (
     "--set=data.batches_per_epoch=40",
     "--set=model.extra_kicks=8",
     "--set=train.epochs=2",
+    "--set=train.schedule=constant",
 )
 
 

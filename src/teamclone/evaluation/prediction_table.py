@@ -320,10 +320,10 @@ def _done(
     arguments, interval = np.zeros((len(frame), 2), np.float32), np.zeros((len(frame), 2, 2), np.float32)
     kind[row], executed[row] = samples["kind"][here], samples["executed"][here]
     arguments[row], interval[row] = samples["parameters"][here], samples["interval"][here]
-    known: NDArray[np.bool_] = np.isfinite(interval).all(axis=2)
+    known = np.isfinite(interval)
     issued = np.full((len(frame), len(parameters_of(commands))), np.nan, np.float32)
     for column, of in enumerate(parameters_of(commands)):
-        carries = (kind == commands.index(of.kind.name.lower())) & known[:, of.argument]
+        carries = (kind == commands.index(of.kind.name.lower())) & known[:, of.argument].all(axis=1)
         issued[carries, column] = arguments[carries, of.argument]
     with_ball = np.isin(kind, [commands.index(name) for name in ("kick", "tackle")])
     return _Done(

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from teamclone.errors import TeamcloneError
     from teamclone.evaluation.evaluate import evaluate
     from teamclone.evaluation.prediction_table import PredictionTable
-    from teamclone.evaluation.report import make_report
     from teamclone.logs import Match, find_matches, read_match
+    from teamclone.report.page import make_report
     from teamclone.store.ingest import ingest
     from teamclone.store.opening import create_store, open_store
     from teamclone.training.config import load_config
@@ -58,7 +58,7 @@ _HOME = {
     "LoadedClone": "api",
     "PredictionTable": "evaluation.prediction_table",
     "evaluate": "evaluation.evaluate",
-    "make_report": "evaluation.report",
+    "make_report": "report.page",
     "TeamcloneError": "errors",
 }
 """The module of each public name, in the order of the pipeline."""

@@ -14,11 +14,11 @@ from teamclone.dataset.build import DatasetConfig, build_dataset, is_current
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import PlayError, UsageError
 from teamclone.evaluation.evaluate import evaluate_and_save
-from teamclone.evaluation.report import fresh_evaluation, make_report
 from teamclone.play.record import Record
 from teamclone.play.runner import PlayReport, play
 from teamclone.play.schedule import Schedule, folder_of, read_schedule, schedule_from
 from teamclone.play.server import find_server
+from teamclone.report.page import fresh_evaluation, make_report
 from teamclone.store import create_store
 from teamclone.system.settings import from_table
 from teamclone.training.config import Config, differences, load_config

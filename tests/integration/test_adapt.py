@@ -24,8 +24,8 @@ from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.evaluation import metrics
 from teamclone.evaluation.evaluate import evaluate
 from teamclone.evaluation.predict import predict
-from teamclone.evaluation.report import commands
 from teamclone.models.clone import model_id
+from teamclone.report.page import commands
 from teamclone.training.adapt import SETTINGS, adaptation
 from teamclone.training.config import load_config, override, to_table
 from teamclone.training.loop import Progress, train

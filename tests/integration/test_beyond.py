@@ -16,9 +16,9 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, UsageError
 from teamclone.evaluation.evaluate import evaluate
-from teamclone.evaluation.report import make_report
 from teamclone.logs import read_match
 from teamclone.rcss.commands import CLONED, REPERTOIRE
+from teamclone.report.page import make_report
 from teamclone.search.run import search
 from teamclone.search.trials import Mode, SearchConfig
 from teamclone.store import create_store

@@ -23,9 +23,9 @@ from teamclone.errors import DatasetError, RunError
 from teamclone.evaluation import latency, metrics
 from teamclone.evaluation.evaluate import evaluate, load_evaluation
 from teamclone.evaluation.predict import predict
-from teamclone.evaluation.report import make_report, number, percent
 from teamclone.models.clone import model_id
 from teamclone.rcss.commands import CLONED_KINDS
+from teamclone.report.page import make_report, number, percent
 from teamclone.training.checkpoint import save_weights
 from teamclone.training.config import load_config
 from teamclone.training.loop import train

@@ -67,6 +67,34 @@ def test_its_files(run: Path, log: Path, tmp_path: Path) -> None:
     players = truth["side"].to_numpy() != 0
     np.testing.assert_array_equal(truth["x"].to_numpy()[players], match.players["x"][at[players], slot[players]])
     assert (tmp_path / "fans.svg").read_text().count("cycles ahead") == STARTS
+    fans = json.loads((tmp_path / "fans.json").read_text())["fans"]
+    assert {fan["cycle"] for fan in fans} == set(truth["cycle"].to_pylist())
+    for fan in fans:
+        assert [body["of"] for body in fan["bodies"]] == [*range(2, 12), "ball"]  # its goalkeeper does not move by it
+        assert len(fan["others"]) == 12
+        for body in fan["bodies"]:
+            assert {len(path) for path in (body["truth"], *body["samples"])} == {fan["ahead"] + 1}
+            assert all(path[0] == body["truth"][0] for path in body["samples"])
+
+
+def test_the_report_shows_them(run: Path, log: Path, tmp_path: Path) -> None:
+    shutil.copytree(run, tmp_path / "run")
+    report = ("report", tmp_path / "run")
+    teamclone(*report)
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "Not played yet: <code>teamclone rollout" in page
+    document = rolled_out(tmp_path / "run", log, *SIZE)
+    teamclone(*report)
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "Not played yet" not in page
+    assert f"From {STARTS} moments of one match the clone plays its team on" in page
+    assert f"<td>{document['ahead']['samples']['ball'][0]['fde']:.2f}</td>" in page
+    assert page.count(f", {HORIZON} cycles ahead</text>") == STARTS
+    # Those of other weights are not shown.
+    found = json.loads((tmp_path / "run" / "rollouts" / "rollouts.json").read_text())
+    (tmp_path / "run" / "rollouts" / "rollouts.json").write_text(json.dumps(found | {"model_id": "0" * 16}))
+    teamclone(*report)
+    assert "Not played yet" in (tmp_path / "run" / "report.html").read_text()
 
 
 @pytest.mark.parametrize("others", ["logged", "last", "clone"])

@@ -18,6 +18,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "src" / PACKAGE
 
 BASE = ("errors", "system", "rcss")
 READING = (*BASE, "logs", "world", "store")
+CLONING = ("dataset", "play", "models", "training", "search", "evaluation")
 MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "errors": (),
     "system": ("errors",),
@@ -36,10 +37,11 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "search": (*BASE, "plots", "dataset", "models", "training"),
     "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "dataset", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
-    "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation"),
+    "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
+    "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline"),
-    "cli": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "rollouts", "pipeline", "api"),
-    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "api"),
+    "cli": (*READING, *CLONING, "rollouts", "report", "pipeline", "api"),
+    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "api"),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""
@@ -54,6 +56,7 @@ MAY_IMPORT_TORCH = (
     "search",
     "evaluation",
     "rollouts",
+    "report",
 )
 
 MOST_LINES = 80

@@ -17,7 +17,7 @@ def report(
     ] = None,
 ) -> None:
     """Write one HTML page about a clone: tables, figures, words. Evaluates the clone first where needed."""
-    from teamclone.evaluation.report import make_report
+    from teamclone.report.page import make_report
     from teamclone.training.run import open_run
 
     opened = open_run(run)

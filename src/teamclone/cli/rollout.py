@@ -45,6 +45,7 @@ def rollout(
     """Play a clone many cycles ahead from frames of matches. Exit code 1 if a log failed."""
     from teamclone.errors import UsageError
     from teamclone.logs import find_matches
+    from teamclone.models.clone import model_id
     from teamclone.rollouts.files import write_rollouts
     from teamclone.rollouts.run import RolloutConfig, in_matches
     from teamclone.training.run import open_run
@@ -75,7 +76,7 @@ def rollout(
         )
     out = out or run / "rollouts"
     plays = None if side is not None else team or opened.team
-    about = {"run": str(run), "checkpoint": checkpoint, "team": plays, "others": others}
+    about = {"run": str(run), "checkpoint": checkpoint, "model_id": model_id(model), "team": plays, "others": others}
     document = write_rollouts(out, found, config, about, trajectories=trajectories)
     if as_json:
         print_json(document)

@@ -1,1 +1,1 @@
-"""The quality of a clone: metrics, baselines, intervals, the paper's tables and figures, the report."""
+"""The quality of a clone: metrics, baselines, intervals, the paper's figures."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,18 +13,21 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from teamclone import __version__
-from teamclone.dynamics.bodies import BALL, N_BODIES
+from teamclone.dynamics.bodies import BALL
+from teamclone.errors import RunError
 from teamclone.evaluation.prediction_file import writing
+from teamclone.plots.fans import draw_fans
 from teamclone.plots.style import LIGHT, style
 from teamclone.rcss.players import N_TEAM
+from teamclone.rollouts.fans import fans_of
 from teamclone.rollouts.run import MatchRollouts, RolloutConfig, figures
-from teamclone.system.documents import write_document
+from teamclone.system.documents import read_document, write_document
 from teamclone.system.files import write_atomic
 
-FORMAT = 1
-"""Format number of rollouts.json."""
-PICTURES = 6
-"""Starts in the picture of fans."""
+FORMAT = 2
+"""Format number of rollouts.json and fans.json."""
+WIDTH = 11.0
+"""Of the picture of fans, inches."""
 _CODES = {"truth": -1, "likeliest": -2, "stand": -3, "coast": -4, "last": -5}
 """``sample`` of the trajectories that are none."""
 
@@ -31,10 +35,13 @@ _CODES = {"truth": -1, "likeliest": -2, "stand": -3, "coast": -4, "last": -5}
 def write_rollouts(
     out: Path, matches: Sequence[MatchRollouts], config: RolloutConfig, about: dict[str, Any], *, trajectories: bool
 ) -> dict[str, Any]:
-    """Write ``rollouts.json``, ``fans.svg`` and, if asked for, ``trajectories.parquet``; return the document.
+    """Write ``rollouts.json``, ``fans.json``, ``fans.svg`` and, if asked for, ``trajectories.parquet``.
 
     Args:
-        about: what else the document should say: run, checkpoint, team.
+        about: what else the document should say: run, checkpoint, model_id, team.
+
+    Returns:
+        The document.
     """
     out.mkdir(parents=True, exist_ok=True)
     document = {
@@ -57,14 +64,39 @@ def write_rollouts(
     }
     write_document(out / "rollouts.json", document)
     # Those of an earlier call are of other roll-outs.
-    for name in ("fans.svg", "trajectories.parquet"):
+    for name in ("fans.json", "fans.svg", "trajectories.parquet"):
         (out / name).unlink(missing_ok=True)
     done = [match for match in matches if match.error is None]
     if done:
-        write_atomic(out / "fans.svg", _fans(done))
+        fans = fans_of(done)
+        write_document(out / "fans.json", {"format": FORMAT, "fans": fans})
+        write_atomic(out / "fans.svg", _picture(fans))
         if trajectories:
             _write_trajectories(out / "trajectories.parquet", done)
     return document
+
+
+def load_rollouts(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Read ``rollouts.json`` and the fans of `fans_of` back.
+
+    Raises:
+        RunError: one is missing, damaged, or of another format.
+    """
+    document, fans = (
+        read_document(folder / name, what="roll-outs", number=FORMAT, command="teamclone rollout", error=RunError)
+        for name in ("rollouts.json", "fans.json")
+    )
+    return document, fans["fans"]
+
+
+def _picture(fans: Sequence[dict[str, Any]]) -> bytes:
+    """Return the fans as an SVG file of its own."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(style(LIGHT)):
+        buffer = io.BytesIO()
+        draw_fans(fans, colours=LIGHT, width=WIDTH).savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue()
 
 
 def _write_trajectories(path: Path, matches: Sequence[MatchRollouts]) -> None:
@@ -109,47 +141,3 @@ def _rows(match: MatchRollouts, start: int, name: str, values: NDArray[np.float3
         "y": values[..., 1].ravel(),
     }
     return pa.table({field.name: pa.array(columns[field.name], field.type) for field in _SCHEMA})
-
-
-def _fans(matches: Sequence[MatchRollouts]) -> bytes:
-    """Draw some starts on the pitch: the samples of the clone's players and of the ball, and where they really went."""
-    import io
-
-    import matplotlib as mpl
-
-    mpl.use("svg")
-    from matplotlib import pyplot as plt
-
-    from teamclone.plots.pitch import draw_pitch
-
-    # The starts whose play goes on longest, of all matches in turn.
-    order = [(match, start) for match in matches for start in np.argsort(-match.reach, kind="stable")[:PICTURES]]
-    chosen = sorted(order, key=lambda one: -int(one[0].reach[one[1]]))[:PICTURES]
-    with mpl.rc_context(style(LIGHT)):
-        figure, axes = plt.subplots(
-            (len(chosen) + 1) // 2, 2, figsize=(11, 3.8 * ((len(chosen) + 1) // 2)), squeeze=False
-        )
-        for at in axes.flat:
-            at.set_axis_off()
-        for at, (match, start) in zip(axes.flat, chosen, strict=False):
-            draw_pitch(at, colour=LIGHT.rule)
-            until = int(min(match.reach[start], match.truth.shape[1] - 1)) + 1
-            _fan(at, match, start, until)
-            at.set_title(f"cycle {match.cycles[start]}, {until - 1} cycles ahead")
-        figure.tight_layout()
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-        plt.close(figure)
-    return buffer.getvalue()
-
-
-def _fan(axes: Any, match: MatchRollouts, start: int, until: int) -> None:
-    own = np.append(match.own[start], True)
-    for body in range(N_BODIES):
-        truth = match.truth[start, :until, body]
-        colour = LIGHT.second if body == BALL else LIGHT.accent
-        if own[body]:
-            for path in match.places["samples"][start, :, :until, body]:
-                axes.plot(*path.T, color=colour, linewidth=0.5, alpha=0.25, zorder=2)
-            axes.plot(*truth.T, color=LIGHT.ink, linewidth=1.2, zorder=3)
-        axes.plot(*truth[0], "o", color=colour if own[body] else LIGHT.muted, markersize=3, zorder=4)

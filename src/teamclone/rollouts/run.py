@@ -61,7 +61,7 @@ class MatchRollouts:
     Attributes:
         path, match_id, side: the match, and the side of the team that the clone plays. error: why there are none.
         starts: (starts,) frames of the match. reach: (starts,) cycles that their stretch of play goes on.
-        own: (starts, 22) which players the clone moves.
+        own: (starts, 22) which players the clone moves. on_field: (starts, 22) who is there.
         truth: (starts, horizon + 1, 23, 2) metres in the log's frame of reference.
         places: by who moves the players, (starts, samples, horizon + 1, 23, 2) metres: ``samples``, ``likeliest``, and
             the guesses ``stand``, ``coast`` and ``last``.
@@ -75,6 +75,7 @@ class MatchRollouts:
     cycles: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     reach: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     own: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, N_PLAYERS), np.bool_))
+    on_field: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, N_PLAYERS), np.bool_))
     truth: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 1, N_BODIES, 2), np.float32))
     places: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
@@ -127,6 +128,7 @@ def roll_out(
         cycles=match.frames["cycle"][starts],
         reach=left[starts],
         own=job.moved(starts),
+        on_field=logged.bodies.on_field[starts],
         truth=truth,
         places={"samples": job.samples(starts), "likeliest": job.likeliest(starts), **job.guesses(starts, truth)},
     )

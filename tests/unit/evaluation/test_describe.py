@@ -12,7 +12,7 @@ from teamclone.evaluation import metrics
 from teamclone.evaluation.baselines import Baselines
 from teamclone.evaluation.describe import describe, unseen_numbers
 from teamclone.evaluation.predictions import Predictions
-from teamclone.evaluation.report import listing, number, percent, points, sentences
+from teamclone.report.page import listing, number, percent, points, sentences
 from teamclone.system.documents import write_document
 
 MATCHES = [{"match_id": f"m{index}", "opponent": "Red" if index < 2 else "Blue"} for index in range(12)]

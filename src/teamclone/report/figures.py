@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
+from teamclone.plots.fans import draw_fans
 from teamclone.plots.pitch import draw_pitch
 from teamclone.plots.style import Colours, style
 from teamclone.rcss.commands import CLONED, REPERTOIRE
@@ -34,7 +35,8 @@ PERCENT = "\N{NARROW NO-BREAK SPACE}%"
 WIDTH = 7.4
 """Inches; the page scales it to its column."""
 
-_STYLE = style(Colours(ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND))
+_COLOURS = Colours(ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND)
+_STYLE = style(_COLOURS)
 
 
 def svg(figure: Figure, *, name: str, alt: str) -> str:
@@ -86,6 +88,12 @@ def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[s
         axes.scatter(*spots.T, s=5.5, color=KIND_COLOURS[kind], alpha=crowd, linewidths=0, zorder=2, rasterized=True)
         axes.set_title(f"{kind}  ·  {counts.get(kind, 0):,}", loc="center")
     return figure
+
+
+@mpl.rc_context(_STYLE)
+def fans(drawn: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw where players and ball may go from some moments, and where they went; see ``plots.fans``."""
+    return draw_fans(drawn, colours=_COLOURS, width=WIDTH)
 
 
 @mpl.rc_context(_STYLE)

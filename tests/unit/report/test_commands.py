@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from teamclone.evaluation.report import commands
+from teamclone.report.page import commands
 
 
 @pytest.mark.parametrize("goalkeepers", [True, False])

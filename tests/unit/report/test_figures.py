@@ -11,8 +11,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from teamclone.evaluation import figures
 from teamclone.plots.pitch import draw_pitch
+from teamclone.report import figures
 
 SCALE = 10  # pixels a metre
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,13 @@ import jinja2
 from markupsafe import Markup
 
 from teamclone.errors import RunError
-from teamclone.evaluation import bootstrap, figures, metrics, paper
+from teamclone.evaluation import bootstrap, metrics, paper
 from teamclone.evaluation.evaluate import evaluate_and_save, load_evaluation
 from teamclone.evaluation.latency import load_bench, measure_run
 from teamclone.models.clone import model_id
 from teamclone.models.config import EgocentricPointConfig, PaperConfig
+from teamclone.report import figures
+from teamclone.rollouts.files import load_rollouts
 from teamclone.system.files import write_atomic
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
@@ -37,6 +40,14 @@ FIGURES = (
     ("macro_f1", "macro F1", "mean F1 of the commands"),
     ("paper_mae", "the paper's MAE", "mean absolute error of all six outputs, zeros included"),
 )
+MOVERS = {
+    "samples": "the clone, drawn",
+    "likeliest": "the clone, its likeliest commands",
+    "last": "as in the last cycle",
+    "coast": "coasting, no commands",
+    "stand": "standing still",
+}
+"""Who moves the players of roll-outs, as ``rollouts.json`` and as the page call them."""
 PITCHES = {4: "Four", 5: "Five", 6: "Six", 7: "Seven"}
 PERCENT = {"accuracy", "balanced_accuracy", "ece"}
 
@@ -257,7 +268,8 @@ def make_report(
             n=quick_predictions,
             on_progress=telling("response times"),
         )
-    html = render(run, evaluation, bench, history=run.history())
+    ahead = fresh_rollouts(run, checkpoint=evaluation["run"]["checkpoint"])
+    html = render(run, evaluation, bench, history=run.history(), ahead=ahead)
     path = out or run.path / "report.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, html.encode())
@@ -284,6 +296,43 @@ def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
         return None
 
 
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """The roll-outs of a run: ``rollouts.json``, and the fans that are drawn."""
+
+    document: dict[str, Any]
+    fans: list[dict[str, Any]]
+
+    def rows(self, group: str) -> list[tuple[str, list[float | None]]]:
+        """Return (who moves the players, mean displacement in metres by `cycles`) of ``players`` or of the ``ball``."""
+        rows = []
+        for name, who in MOVERS.items():
+            found = {row["cycles"]: row["fde"] for row in self.document["ahead"][name][group]}
+            rows.append((who, [found.get(cycles) for cycles in self.cycles]))
+        return rows
+
+    @property
+    def cycles(self) -> list[int]:
+        """The cycles ahead of the columns."""
+        return [row["cycles"] for row in self.document["ahead"]["samples"]["players"]]
+
+    @property
+    def starts(self) -> str:
+        """From how much they begin, in words."""
+        counts = [match["starts"] for match in self.document["matches"] if match["starts"]]
+        return f"{sum(counts):,} moments of {'one match' if len(counts) == 1 else f'{len(counts)} matches'}"
+
+
+def fresh_rollouts(run: Run, *, checkpoint: str) -> Ahead | None:
+    """Return the roll-outs in the run, if they are of these weights."""
+    try:
+        document, fans = load_rollouts(run.path / "rollouts")
+        fresh = document["model_id"] == model_id(run.load_model(checkpoint)) and document["ahead"]
+    except (RunError, KeyError):
+        return None
+    return Ahead(document, fans) if fresh else None
+
+
 def trained_error(config: Config) -> str:
     """What a run took as the error of parameters, in words."""
     if not isinstance(config.model, PaperConfig | EgocentricPointConfig):
@@ -292,7 +341,9 @@ def trained_error(config: Config) -> str:
     return f"mean square over {where}"
 
 
-def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, history: Sequence[Any]) -> dict[str, Markup]:
+def _plots(
+    evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, history: Sequence[Any], ahead: Ahead | None
+) -> dict[str, Markup]:
     """Return the figures by name; those without data are missing."""
     data, splits = evaluation["data"], evaluation["splits"]
     team = evaluation["dataset"]["team"]
@@ -348,11 +399,21 @@ def _plots(evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, histo
             ),
             f"Histogram of response times, half of them below {bench['single']['p50_us']:.0f} microseconds",
         )
+    if ahead is not None and ahead.fans:
+        drawn["fans"] = (
+            figures.fans(ahead.fans),
+            f"{len(ahead.fans)} pitches with sampled paths of players and ball, and the paths that they took",
+        )
     return {name: Markup(figures.svg(drawing, name=name, alt=alt)) for name, (drawing, alt) in drawn.items()}
 
 
 def render(
-    run: Run, evaluation: Mapping[str, Any], bench: Mapping[str, Any] | None, *, history: Sequence[Mapping[str, Any]]
+    run: Run,
+    evaluation: Mapping[str, Any],
+    bench: Mapping[str, Any] | None,
+    *,
+    history: Sequence[Mapping[str, Any]],
+    ahead: Ahead | None = None,
 ) -> str:
     """Return the report as HTML.
 
@@ -361,6 +422,7 @@ def render(
         evaluation: from `evaluate.evaluate`.
         bench: from `latency.measure_latency`; None leaves the response times out.
         history: from ``run.history()``; empty leaves the training curves out.
+        ahead: from `fresh_rollouts`; None leaves the roll-outs out.
     """
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -394,7 +456,8 @@ def render(
         few_matches=bootstrap.FEW_MATCHES,
         commands=commands(evaluation, trained_on=run.dataset_path),
         paper=paper,
-        plots=_plots(evaluation, bench, history),
+        plots=_plots(evaluation, bench, history, ahead),
+        ahead=ahead,
         trained_error=trained_error(run.config),
         settings=to_toml(run.config),
         versions={**run.environment, **evaluation["versions"]},

@@ -1,0 +1,1 @@
+"""One HTML file of all that was measured of a clone."""

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from teamclone.cli.common import fail, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from teamclone.rollouts.run import MatchRollouts
 
 _WHO = {
     "samples": "clone, samples",
@@ -35,6 +39,16 @@ def rollout(
     others: Annotated[
         str, typer.Option(help="The other team: logged, last (goes on as in the last cycle) or clone:RUN.")
     ] = "logged",
+    ball: Annotated[
+        str,
+        typer.Option(
+            help="free: moved by the players alone; touched: as logged after each touch of the other team; logged: "
+            "always as logged."
+        ),
+    ] = "free",
+    from_cycle: Annotated[
+        list[int] | None, typer.Option(help="Start from this cycle in place of drawn ones; repeatable.")
+    ] = None,
     checkpoint: Annotated[str, typer.Option(help="Which weights.")] = "best-loss",
     seed: Annotated[int, typer.Option(min=0, help="Of starts, samples and noise.")] = 0,
     trajectories: Annotated[
@@ -55,27 +69,24 @@ def rollout(
         raise UsageError(f"--others {others!r} is unknown, choose one of: logged, last, clone:RUN")
     if team is not None and side is not None:
         raise UsageError("name either a team or a side")
+    if ball not in {"free", "touched", "logged"}:
+        raise UsageError(f"--ball {ball!r} is unknown, choose one of: free, touched, logged")
     opened = open_run(run)
     model = opened.load_model(checkpoint).eval()
-    config = RolloutConfig(horizon=horizon, samples=samples, starts=starts, others=kind, seed=seed)
-    with progress("rollout") as bar:
-        task = bar.add_task("", total=None)
-
-        def on_match(path: Path) -> Callable[[], None]:
-            bar.update(task, description=path.name)
-            return lambda: bar.advance(task)
-
-        found = in_matches(
-            model,
-            [pair.rcg for pair in find_matches(logs) if pair.rcg is not None],
-            config,
-            team=(team or opened.team) if side is None else None,
-            side=side,
-            other=open_run(Path(other)).load_model(checkpoint).eval() if other else None,
-            on_match=on_match,
-        )
-    out = out or run / "rollouts"
+    config = RolloutConfig(
+        horizon=horizon,
+        samples=samples,
+        starts=starts,
+        others=kind,
+        ball=ball,
+        cycles=tuple(from_cycle or ()),
+        seed=seed,
+    )
     plays = None if side is not None else team or opened.team
+    paths = [pair.rcg for pair in find_matches(logs) if pair.rcg is not None]
+    against = open_run(Path(other)).load_model(checkpoint).eval() if other else None
+    found = _watched(partial(in_matches, model, paths, config, team=plays, side=side, other=against))
+    out = out or run / "rollouts"
     about = {"run": str(run), "checkpoint": checkpoint, "model_id": model_id(model), "team": plays, "others": others}
     document = write_rollouts(out, found, config, about, trajectories=trajectories)
     if as_json:
@@ -86,6 +97,18 @@ def rollout(
     failed = [match for match in found if match.error is not None]
     if failed:
         fail("; ".join(str(match.error) for match in failed), code=1)
+
+
+def _watched(roll_out: Callable[..., list[MatchRollouts]]) -> list[MatchRollouts]:
+    """Return the roll-outs of matches, behind a progress bar."""
+    with progress("rollout") as bar:
+        task = bar.add_task("", total=None)
+
+        def on_match(path: Path) -> Callable[[], None]:
+            bar.update(task, description=path.name)
+            return lambda: bar.advance(task)
+
+        return roll_out(on_match=on_match)
 
 
 def _table(ahead: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
@@ -99,4 +122,11 @@ def _table(ahead: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
             rows.append(
                 [f"{group}: {who}", *(f"{found[one]:.2f}" if found.get(one) is not None else "" for one in cycles)]
             )
+    agreement = {row["cycles"]: row["agreement"] for row in ahead["likeliest"]["players"]}
+    rows.append(
+        [
+            "its command is that of the log",
+            *(f"{agreement[one]:.3f}" if agreement[one] is not None else "" for one in cycles),
+        ]
+    )
     return headers, rows

@@ -113,6 +113,43 @@ class AsLogged:
 
 
 @dataclass(frozen=True, slots=True)
+class BallAsLogged:
+    """The ball is where the log has it; a policy of the ball, whoever moves the players.
+
+    Attributes:
+        frames: (n_frames,) bool, in which frames. In the others it moves as the step has it.
+    """
+
+    match: Logged
+    frames: NDArray[np.bool_]
+
+    @classmethod
+    def throughout(cls, match: Logged) -> BallAsLogged:
+        """Return the policy of a ball that never leaves its logged way."""
+        return cls(match, np.ones(len(match.bodies), np.bool_))
+
+    @classmethod
+    def touched_by(cls, match: Logged, slots: NDArray[np.bool_]) -> BallAsLogged:
+        """Return the policy of a ball that goes where some players kicked, tackled or caught it in the log."""
+        kind = match.commands.kind
+        touch = (kind == CommandKind.KICK) | match.succeeded
+        after = np.zeros(len(match.bodies), np.bool_)
+        after[1:] = touch[:-1, slots].any(axis=1)
+        return cls(match, after)
+
+    def command(self, worlds: Worlds, frames: NDArray[np.int64], commands: Commands) -> None:
+        """Leave the commands as they are."""
+
+    def settle(self, bodies: Bodies, frames: NDArray[np.int64]) -> None:
+        """Put the ball where the log has it."""
+        frames = np.minimum(frames, len(self.match.bodies) - 1)
+        here = self.frames[frames]
+        logged = self.match.bodies.select(frames[here])
+        for name in ("x", "y", "vx", "vy"):
+            getattr(bodies, name)[here, BALL] = getattr(logged, name)[:, BALL]
+
+
+@dataclass(frozen=True, slots=True)
 class GoingOn:
     """Players go on with the velocity that they had, and turn no more.
 

@@ -24,8 +24,8 @@ from teamclone.logs.align import plays_on
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rollouts.measure import Ahead, measure
-from teamclone.rollouts.policies import AsLogged, Cloned, GoingOn, Policy
-from teamclone.rollouts.simulate import simulate
+from teamclone.rollouts.policies import AsLogged, BallAsLogged, Cloned, GoingOn, Policy
+from teamclone.rollouts.simulate import Trajectories, simulate
 from teamclone.rollouts.worlds import Worlds, slots_of
 from teamclone.world.view import view
 from teamclone.world.world import World
@@ -44,6 +44,9 @@ class RolloutConfig:
     Attributes:
         horizon: cycles ahead. samples: of each start. starts: of each match, drawn from all cycles of play_on.
         others: what the other team does: "logged", "last" (go on as in the last cycle), or "clone".
+        ball: "free": moved by the players' commands alone; "touched": after each kick, tackle and catch that the other
+            team has in the log, as the log has it; "logged": always as the log has it.
+        cycles: where to start, in place of drawn starts.
         seed: of starts, samples and noise.
     """
 
@@ -51,6 +54,8 @@ class RolloutConfig:
     samples: int = 32
     starts: int = 50
     others: str = "logged"
+    ball: str = "free"
+    cycles: tuple[int, ...] = ()
     seed: int = 0
 
 
@@ -63,6 +68,8 @@ class MatchRollouts:
         starts: (starts,) frames of the match. reach: (starts,) cycles that their stretch of play goes on.
         own: (starts, 22) which players the clone moves. on_field: (starts, 22) who is there.
         truth: (starts, horizon + 1, 23, 2) metres in the log's frame of reference.
+        agreed: (starts, horizon, 22) float, 1 where a player's likeliest command is of the kind that the log has in
+            that cycle, 0 where it is not, NaN where the log has none or the player is not the clone's.
         places: by who moves the players, (starts, samples, horizon + 1, 23, 2) metres: ``samples``, ``likeliest``, and
             the guesses ``stand``, ``coast`` and ``last``.
     """
@@ -77,6 +84,7 @@ class MatchRollouts:
     own: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, N_PLAYERS), np.bool_))
     on_field: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, N_PLAYERS), np.bool_))
     truth: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 1, N_BODIES, 2), np.float32))
+    agreed: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0, N_PLAYERS), np.float32))
     places: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
@@ -111,14 +119,11 @@ def roll_out(
     if match.log is None:
         _recover_pushes(logged, rules)
     left = _cycles_left(logged)
-    rng = np.random.default_rng(config.seed)
-    possible = np.flatnonzero((left > 0) & _is_whole(logged))
-    if not len(possible):
-        raise UsageError(f"{path}: expected cycles of play_on with all positions, got none")
-    starts = np.sort(rng.choice(possible, min(config.starts, len(possible)), replace=False))
+    starts = _starts(path, config, match.frames["cycle"], (left > 0) & _is_whole(logged))
     job = _Job(model, other, logged, world, rules, ours, config, on_cycle)
     last = len(left) - 1
     at = np.minimum(starts[:, None] + np.arange(config.horizon + 1), last)
+    likeliest, kind = job.likeliest(starts)
     truth = np.stack([logged.bodies.x[at], logged.bodies.y[at]], axis=-1).astype(np.float32)
     return MatchRollouts(
         path=path,
@@ -130,8 +135,30 @@ def roll_out(
         own=job.moved(starts),
         on_field=logged.bodies.on_field[starts],
         truth=truth,
-        places={"samples": job.samples(starts), "likeliest": job.likeliest(starts), **job.guesses(starts, truth)},
+        agreed=_agreed(kind, logged.commands.kind[at[:, :-1]], job.moved(starts)),
+        places={"samples": job.samples(starts), "likeliest": likeliest, **job.guesses(starts, truth)},
     )
+
+
+def _starts(
+    path: Path, config: RolloutConfig, cycle: NDArray[np.int32], possible: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return the frames to start from; ``possible`` (n_frames,) are those that play goes on from."""
+    frames = np.flatnonzero(possible)
+    if not len(frames):
+        raise UsageError(f"{path}: expected cycles of play_on with all positions, got none")
+    if not config.cycles:
+        rng = np.random.default_rng(config.seed)
+        return np.sort(rng.choice(frames, min(config.starts, len(frames)), replace=False))
+    found = frames[np.isin(cycle[frames], config.cycles)]
+    if missing := sorted({*config.cycles} - {*cycle[found].tolist()}):
+        raise UsageError(f"{path}: no play_on goes on from cycle {', '.join(map(str, missing))}")
+    return found
+
+
+def _agreed(kind: NDArray[np.uint8], logged: NDArray[np.uint8], own: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return `MatchRollouts.agreed` of (starts, horizon, 22) commands of roll-outs and of the log."""
+    return np.where((logged > 0) & own[:, None], kind == logged, np.nan).astype(np.float32)
 
 
 def in_matches(
@@ -166,6 +193,7 @@ def figures(matches: Sequence[MatchRollouts]) -> dict[str, dict[str, list[dict[s
     ball = np.zeros((len(own), N_BODIES), np.bool_)
     ball[:, BALL] = True
     players = np.concatenate([own, np.zeros((len(own), 1), np.bool_)], axis=1)
+    agreed = np.concatenate([match.agreed for match in done])
     found: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for name in done[0].places:
         sampled = np.concatenate([match.places[name] for match in done])
@@ -173,6 +201,9 @@ def figures(matches: Sequence[MatchRollouts]) -> dict[str, dict[str, list[dict[s
             group: [_finite(one) for one in measure(sampled, truth, there, reach)]
             for group, there in (("players", players), ("ball", ball))
         }
+    for row in found["likeliest"]["players"]:
+        of_cycle = agreed[reach >= row["cycles"], row["cycles"] - 1]
+        row["agreement"] = float(np.nanmean(of_cycle)) if np.isfinite(of_cycle).any() else None
     return found
 
 
@@ -208,6 +239,11 @@ def _is_whole(match: Logged) -> NDArray[np.bool_]:
     return whole
 
 
+def _places(went: Trajectories) -> NDArray[np.float32]:
+    """Return (n, horizon + 1, 23, 2)."""
+    return np.stack([went.x, went.y], axis=-1)
+
+
 _NUMBERS = ("body", "neck", "stamina", "effort", "recovery", "capacity")
 
 
@@ -240,15 +276,21 @@ class _Job:
         generator = torch.Generator().manual_seed(self.config.seed)
         rng = np.random.default_rng((self.config.seed, 1))
         parts = [
-            self._run(np.repeat(starts[begin : begin + at_once], count), point=False, generator=generator, rng=rng)
+            _places(
+                self._run(np.repeat(starts[begin : begin + at_once], count), point=False, generator=generator, rng=rng)
+            )
             for begin in range(0, len(starts), at_once)
         ]
         places = np.concatenate(parts)
         return places.reshape(len(starts), count, *places.shape[1:])
 
-    def likeliest(self, starts: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return (starts, 1, horizon + 1, 23, 2) where the likeliest commands lead, without noise."""
-        return self._run(starts, point=True, generator=torch.Generator(), rng=None)[:, None]
+    def likeliest(self, starts: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Return where the likeliest commands lead, without noise, and which they are.
+
+        (starts, 1, horizon + 1, 23, 2) places and (starts, horizon, 22) kinds.
+        """
+        went = self._run(starts, point=True, generator=torch.Generator(), rng=None)
+        return _places(went)[:, None], went.kind
 
     def guesses(self, starts: NDArray[np.int64], truth: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
         """Return the plain guesses: that bodies stand, coast, or go on with their last velocity; the ball rolls on."""
@@ -274,18 +316,30 @@ class _Job:
         point: bool,
         generator: torch.Generator,
         rng: np.random.Generator | None,
-    ) -> NDArray[np.float32]:
+    ) -> Trajectories:
         worlds = self._worlds(starts)
         policies = [
             *self._others(worlds, point=point, generator=generator),
             Cloned(self.model, self.side, point, generator),
+            *self._ball(),
         ]
-        went = simulate(worlds, starts, policies, horizon=self.config.horizon, rng=rng, on_cycle=self.on_cycle)
-        return np.stack([went.x, went.y], axis=-1)
+        return simulate(worlds, starts, policies, horizon=self.config.horizon, rng=rng, on_cycle=self.on_cycle)
 
-    def _others(self, worlds: Worlds, *, point: bool, generator: torch.Generator) -> list[Policy]:
+    def _ball(self) -> list[Policy]:
+        if self.config.ball == "logged":
+            return [BallAsLogged.throughout(self.match)]
+        if self.config.ball == "touched":
+            return [BallAsLogged.touched_by(self.match, self._theirs())]
+        return []
+
+    def _theirs(self) -> NDArray[np.bool_]:
+        """Return (22,) the other team's players."""
         theirs = np.ones(N_PLAYERS, np.bool_)
         theirs[slots_of(self.side)] = False
+        return theirs
+
+    def _others(self, worlds: Worlds, *, point: bool, generator: torch.Generator) -> list[Policy]:
+        theirs = self._theirs()
         if self.config.others == "logged":
             # A goalkeeper that the clone does not know does as logged, too.
             if "catch" not in self.model.config.commands:

@@ -11,20 +11,23 @@ from numpy.typing import NDArray
 from teamclone.dynamics.bodies import N_BODIES
 from teamclone.dynamics.step import step
 from teamclone.rcss.commands import CommandKind
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rollouts.policies import Policy, nothing
 from teamclone.rollouts.worlds import Worlds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectories:
-    """Places of ball and players over the cycles of roll-outs.
+    """What ball and players do over the cycles of roll-outs.
 
     Attributes:
         x, y: (n, horizon + 1, 23) float32 metres in the log's frame of reference; the first is the start.
+        kind: (n, horizon, 22) the CommandKind that each player executed in each cycle, 0 none.
     """
 
     x: NDArray[np.float32]
     y: NDArray[np.float32]
+    kind: NDArray[np.uint8]
 
 
 def simulate(
@@ -47,6 +50,7 @@ def simulate(
     """
     n = len(frames)
     x, y = (np.empty((n, horizon + 1, N_BODIES), np.float32) for _ in range(2))
+    kind = np.empty((n, horizon, N_PLAYERS), np.uint8)
     x[:, 0], y[:, 0] = worlds.bodies.x, worlds.bodies.y
     for ahead in range(horizon):
         commands = nothing(n)
@@ -58,7 +62,7 @@ def simulate(
         dashed = ~np.isnan(commands.legs[..., 0]).all(axis=-1)
         executed = np.where(commands.kind == 0, dashed * int(CommandKind.DASH), commands.kind).astype(np.uint8)
         worlds = worlds.after(bodies, commands, executed)
-        x[:, ahead + 1], y[:, ahead + 1] = bodies.x, bodies.y
+        x[:, ahead + 1], y[:, ahead + 1], kind[:, ahead] = bodies.x, bodies.y, executed
         if on_cycle is not None:
             on_cycle()
-    return Trajectories(x=x, y=y)
+    return Trajectories(x=x, y=y, kind=kind)

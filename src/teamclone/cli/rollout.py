@@ -93,6 +93,7 @@ def rollout(
         print_json(document)
     elif document["ahead"]:
         print_table(*_table(document["ahead"]), numeric=range(1, 50))
+        print(_realism(document["realism"]))
         print(f"Wrote {out}")
     failed = [match for match in found if match.error is not None]
     if failed:
@@ -109,6 +110,18 @@ def _watched(roll_out: Callable[..., list[MatchRollouts]]) -> list[MatchRollouts
             return lambda: bar.advance(task)
 
         return roll_out(on_match=on_match)
+
+
+def _realism(scores: dict[str, dict[str, float]]) -> str:
+    """Return the realism of the samples between floor and ceiling, in one line."""
+    names = {
+        "samples": "clone",
+        "coast": "coast",
+        "last": "go on as in the last cycle",
+        "other matches": "other matches",
+    }
+    shown = [f"{who} {scores[name]['all']:.3f}" for name, who in names.items() if name in scores]
+    return f"realism, 1 is as logged: {', '.join(shown)}"
 
 
 def _table(ahead: dict[str, Any]) -> tuple[list[str], list[list[str]]]:

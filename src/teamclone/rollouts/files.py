@@ -20,6 +20,7 @@ from teamclone.plots.fans import draw_fans
 from teamclone.plots.style import LIGHT, style
 from teamclone.rcss.players import N_TEAM
 from teamclone.rollouts.fans import fans_of
+from teamclone.rollouts.realism import realism
 from teamclone.rollouts.run import MatchRollouts, RolloutConfig, figures
 from teamclone.system.documents import read_document, write_document
 from teamclone.system.files import write_atomic
@@ -61,6 +62,7 @@ def write_rollouts(
             for match in matches
         ],
         "ahead": figures(matches),
+        "realism": realism(matches),
     }
     write_document(out / "rollouts.json", document)
     # Those of an earlier call are of other roll-outs.

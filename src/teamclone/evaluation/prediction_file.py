@@ -139,6 +139,7 @@ def writing(out: Path) -> Iterator[Callable[[pa.Table], None]]:
     """Return a function that appends a table to a file, which gets its name when all of it is there."""
     out.parent.mkdir(parents=True, exist_ok=True)
     temporary = out.with_name(f".{out.name}.part")
+    temporary.unlink(missing_ok=True)  # it may be a link to anywhere
     writer: _Writer | None = None
 
     def write(table: pa.Table) -> None:

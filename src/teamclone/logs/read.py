@@ -42,6 +42,13 @@ Measured: over 0.998 for the logs of one match, under 0.6 for two matches of the
 """
 
 
+_SIDES = (b"l", b"r")
+"""Of a team, as the referee calls it."""
+_ARCHIVE = re.compile(r"\.(tar(\.\w+)?|tgz|zip|7z)\Z", re.IGNORECASE)
+_TAR = b"ustar"
+"""What stands 257 bytes into a tar archive."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogPair:
     """The files of one match; one of them may be missing."""
@@ -88,7 +95,9 @@ def find_matches(paths: Iterable[Path]) -> list[LogPair]:
             if partner is not None:
                 pair.setdefault("rcl" if kind == "rcg" else "rcg", partner)
     if not found:
-        raise UsageError(f"no .rcg or .rcl file under {', '.join(map(str, given)) or 'no path'}")
+        archives = sorted(file for path in given for file in path.rglob("*") if _ARCHIVE.search(file.name))
+        unpack = f"; unpack {archives[0].name} first (tar xf)" if archives else ""
+        raise UsageError(f"no .rcg or .rcl file under {', '.join(map(str, given)) or 'no path'}{unpack}")
     return [LogPair(rcg=pair.get("rcg"), rcl=pair.get("rcl")) for _, pair in sorted(found.items())]
 
 
@@ -258,6 +267,8 @@ def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
     # Version 1 has no header: it begins with the 16-bit mode of its first record, 1 to 9.
     if data.startswith((b"ULG\x02", b"ULG\x03")) or (data[:1] == b"\x00" and data[1:2] and 1 <= data[1] <= 9):
         return read_binary(data, path=path)
+    if data[257:262] == _TAR:
+        raise LogError("is a tar archive: unpack it (tar xf) and name the logs or their folder", path=path)
     raise LogError(
         f"is no game log (.rcg) of version 1 to 6 or JSON and no command log (.rcl): begins with {data[:8]!r}",
         path=path,
@@ -265,12 +276,16 @@ def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
 
 
 def _game_of_commands(data: bytes) -> GameLog:
-    """Return the game that a command log shows: the names, in the order of connection."""
+    """Return the game that a command log shows: the names, in the order of connection, and the goals announced."""
     names: list[str | None] = [*sender_names(data)[:2], None, None]
+    goals = {
+        side: [int(count) for count in re.findall(rb"\(referee goal_%b_(\d{1,4})\)" % side, data)] for side in _SIDES
+    }
+    left, right = (max(goals[side], default=0) for side in _SIDES)
     return GameLog(
         log_version="none",
-        left=Team(name=names[0], score=0),
-        right=Team(name=names[1], score=0),
+        left=Team(name=names[0], score=left),
+        right=Team(name=names[1], score=right),
         frames=empty_columns(FRAMES, 0),
         players=empty_columns(PLAYERS, 0, N_PLAYERS),
         player_types=default_player_types(0),

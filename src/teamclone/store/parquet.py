@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -148,7 +149,7 @@ class ParquetStore(Store):
                 )
             reader = pa.RecordBatchReader.from_stream(connection.sql(query))
         except duckdb.Error as error:
-            raise UsageError(_sql_error(error)) from None
+            raise _query_error(error) from None
         return QueryRows(reader.schema, _batches(reader))
 
     def _connect(self) -> duckdb.DuckDBPyConnection:
@@ -161,7 +162,10 @@ class ParquetStore(Store):
             }
         )
         for statement in self._views():
-            connection.execute(statement)
+            try:
+                connection.execute(statement)
+            except duckdb.Error as error:
+                raise _query_error(error) from None
         return connection
 
     def _views(self) -> list[str]:
@@ -250,11 +254,13 @@ class ParquetStore(Store):
         Under another name first: a worker that lives on though its connection is lost must not find its folder half
         emptied and put that among the matches.
         """
+        if self._unfinished.is_symlink():
+            raise StoreError(f"{self._unfinished}: is a link; what lies there would be deleted: remove the link")
         for left in self._unfinished.glob("*"):
             grave = self._unfinished / uuid.uuid4().hex
             with suppress(OSError):
                 left.rename(grave)
-            if grave.is_dir():
+            if grave.is_dir() and not grave.is_symlink():
                 shutil.rmtree(grave, ignore_errors=True)
             else:
                 grave.unlink(missing_ok=True)
@@ -275,7 +281,10 @@ class ParquetStore(Store):
         with tempfile.TemporaryDirectory(prefix="teamclone-") as scratch:
             with duckdb.connect(str(Path(scratch) / DATABASE)) as made:
                 for statement in wanted:
-                    made.execute(statement)
+                    try:
+                        made.execute(statement)
+                    except duckdb.Error as error:
+                        raise _query_error(error) from None
                 made.execute(f"comment on view matches is '{mark}'")
             shutil.copyfile(Path(scratch) / DATABASE, fresh)
         fresh.replace(path)
@@ -306,7 +315,15 @@ def _batches(reader: pa.RecordBatchReader) -> Iterator[pa.RecordBatch]:
     try:
         yield from reader
     except (pa.ArrowException, OSError) as error:  # an error while DuckDB computes rows
-        raise UsageError(_sql_error(error)) from None
+        raise _query_error(error) from None
+
+
+def _query_error(error: Exception) -> StoreError | UsageError:
+    """Return what to say of an error of DuckDB: of a file of the store, or of the query."""
+    damaged = re.search(r"'([^']*\.parquet)'", str(error))
+    if damaged is None:
+        return UsageError(_sql_error(error))
+    return StoreError(f"{damaged[1]}: cannot be read ({_sql_error(error)}); {_remedy(Path(damaged[1]))}")
 
 
 def _sql_error(error: Exception) -> str:

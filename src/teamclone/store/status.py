@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -62,6 +63,10 @@ class FileStatus:
         Raises:
             ValueError, KeyError, TypeError: the values are not those of a status.
         """
+        match_id = values["match_id"]
+        # It becomes a part of paths, and a store may be somebody else's.
+        if match_id is not None and re.fullmatch("[0-9a-f]{16}", match_id) is None:
+            raise ValueError(f"{match_id!r} is no match id")
         return cls(**{**values, "outcome": FileOutcome(values["outcome"])})
 
 

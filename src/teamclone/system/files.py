@@ -13,11 +13,13 @@ from pathlib import Path
 def write_atomic(path: Path, data: bytes) -> None:
     """Write a file so that a reader, also after a crash, sees the old one or the new one.
 
-    One process at a time may write a path; the remains of a killed one are overwritten by the next.
+    One process at a time may write a path; the next one removes the remains of a killed one.
     """
     temporary = path.with_name(f".{path.name}.part")
+    # What has this name, in a folder that may be somebody else's, may be a link to anywhere.
+    temporary.unlink(missing_ok=True)
     try:
-        with temporary.open("wb") as file:
+        with temporary.open("xb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teamclone.errors import LogError
+from teamclone.errors import LogError, UsageError
 from teamclone.logs import Match, find_matches, read_match
 from teamclone.logs.match import GameLog
 from teamclone.logs.rcl import read_commands
@@ -228,6 +228,26 @@ def test_a_lone_command_log(rcg_of: Callable[[str], Path], tmp_path: Path):
     assert len(match.commands["kind"]) == 30511
     assert (match.commands["frame"] == -1).all()
     assert match.players["x"].shape == (0, 22)
+
+
+def test_a_lone_command_log_has_the_goals_that_the_referee_announced(tmp_path: Path):
+    lines = ["0,0\tRecv Alpha_1: (dash 10)", "0,0\tRecv Beta_1: (dash 10)"]
+    lines += [f"{cycle},0\t(referee goal_{goal})" for cycle, goal in ((2, "r_1"), (5, "l_1"), (8, "r_2"))]
+    path = tmp_path / "lone.rcl"
+    path.write_text("\n".join([*lines, ""]))
+    match = read_match(path)
+    assert (match.left.score, match.right.score) == (1, 2)
+
+
+def test_archives_are_to_be_unpacked(rcg_of: Callable[[str], Path], tmp_path: Path):
+    import tarfile
+
+    with tarfile.open(tmp_path / "games.rcg.tar.gz", "w:gz") as archive:
+        archive.add(rcg_of("v6"), arcname="one.rcg.gz")
+    with pytest.raises(LogError, match=r"is a tar archive: unpack it \(tar xf\)"):
+        read_match(tmp_path / "games.rcg.tar.gz")
+    with pytest.raises(UsageError, match=r"no .rcg or .rcl file under .*; unpack games.rcg.tar.gz first"):
+        find_matches([tmp_path])
 
 
 def test_a_lone_game_log(rcg_of: Callable[[str], Path], tmp_path: Path):

@@ -128,6 +128,45 @@ def test_a_read_only_store_can_be_asked(filled: Path) -> None:
             path.chmod(0o755)
 
 
+def test_a_planted_link_costs_nobody_anything(filled: Path, match: Match, tmp_path: Path) -> None:
+    """A store may be somebody else's: what its links and status rows point at is left alone."""
+    victim = tmp_path / "victim"
+    (victim / "sub").mkdir(parents=True)
+    (victim / "diary").write_text("precious")
+    store = open_store(filled)
+    (filled / "unfinished" / "link").symlink_to(victim)
+    with store.writing():
+        pass
+    assert (victim / "diary").read_text() == "precious"
+    assert not list((filled / "unfinished").iterdir())
+    (filled / "unfinished").rmdir()
+    (filled / "unfinished").symlink_to(victim)
+    with pytest.raises(StoreError, match="unfinished: is a link"), store.writing():
+        pass
+    assert sorted(path.name for path in victim.iterdir()) == ["diary", "sub"]
+
+
+@pytest.mark.parametrize("match_id", ["/etc", "../..", "..", "", "0" * 15, "0" * 16 + "/x"])
+def test_a_status_row_of_no_match_is_left_out(filled: Path, match_id: str) -> None:
+    row = {"path": "/a.rcg", "outcome": "ok", "rows": 1, "error": None, "size": 1, "mtime_ns": 1, "content": "0"}
+    (filled / "files" / "planted.json").write_text(json.dumps(row | {"match_id": match_id}))
+    assert all(status.path != "/a.rcg" for status in open_store(filled).files())
+    (filled / "files" / "planted.json").write_text(json.dumps(row | {"match_id": "0" * 16}))
+    assert any(status.path == "/a.rcg" for status in open_store(filled).files())
+
+
+@pytest.mark.parametrize("table", ["matches", "events", "commands"])
+def test_a_truncated_file_is_named_whatever_is_asked(filled: Path, table: str) -> None:
+    [path] = (filled / "matches").glob(f"*/{table}.parquet")
+    path.write_bytes(path.read_bytes()[:-20])
+    store = open_store(filled)
+    for ask in (store.matches, lambda: store.sql(f"select * from {table}")):
+        with pytest.raises(StoreError, match="cannot be read") as error:
+            ask()
+        assert str(path) in str(error.value)
+        assert "\n" not in str(error.value)
+
+
 def test_leftovers_of_a_killed_ingest_go(filled: Path) -> None:
     left = filled / "unfinished" / "0123456789abcdef-xyz"
     left.mkdir()

@@ -13,6 +13,7 @@ from teamclone.dynamics.logged import Logged
 from teamclone.dynamics.residuals import Residual, residuals
 from teamclone.dynamics.rules import Rules
 from teamclone.errors import UsageError
+from teamclone.logs.align import plays_on
 from teamclone.logs.match import Columns
 from teamclone.rcss.players import N_TEAM
 
@@ -104,6 +105,13 @@ MISSING_FRAMES = Law(
     parameters="",
 )
 
+SUBSTITUTIONS = Law(
+    name="physics-type",
+    about="nobody changes the player type while play goes on",
+    off="has type {:.0f} in place of",
+    parameters="",
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deviation:
@@ -150,6 +158,7 @@ def audit(match: Logged, rules: Rules) -> Audit:
         unknown=found.unknown,
         deviations=(
             *_missing_frames(match.frames, rules),
+            *_substitutions(match),
             *(deviation for name, residual in found.of.items() for deviation in judge.deviations(name, residual)),
         ),
     )
@@ -204,6 +213,28 @@ def _missing_frames(frames: Columns, rules: Rules) -> Iterator[Deviation]:
         )
 
 
+def _substitutions(match: Logged) -> Iterator[Deviation]:
+    """Yield the one deviation of a log in which players change types in play_on, which the server refuses coaches."""
+    at = np.flatnonzero(plays_on(match.frames) & ~match.trainer)
+    before, after = match.bodies.select(at), match.bodies.select(at + 1)
+    changed = before.on_field & after.on_field & (before.type != after.type)
+    if changed.any():
+        row, player = (int(place) for place in np.argwhere(changed)[0])
+        yield Deviation(
+            law=SUBSTITUTIONS,
+            rows=int(changed.sum()),
+            cycle=int(match.frames["cycle"][at[row] + 1]),
+            what=f"{_name(player)} {SUBSTITUTIONS.off.format(after.type[row, player])} {before.type[row, player]}; "
+            "likely this value was changed after the match; what it did in this cycle is not compared",
+        )
+
+
+def _name(body: int) -> str:
+    if body == BALL:
+        return "the ball"
+    return f"{'left' if body < N_TEAM else 'right'} {body % N_TEAM + 1}"
+
+
 class _Judge:
     """Says of the deviations of a match what they are and what they most likely come from.
 
@@ -222,13 +253,12 @@ class _Judge:
             return
         row, body = (int(place) for place in np.argwhere(wrong)[0])
         explained = residual.noise[row, body] + residual.rounding[row, body]
-        who = "the ball" if body == BALL else f"{'left' if body < N_TEAM else 'right'} {body % N_TEAM + 1}"
         yield Deviation(
             law=LAWS[name],
             rows=int(wrong.sum()),
             cycle=int(self.match.frames["cycle"][self.at[row] + 1]),
-            what=f"{who} {LAWS[name].off.format(residual.error[row, body])}, of which noise and rounding explain "
-            f"{explained:.2g}; likely {self._cause(name, ~np.isnan(residual.error), wrong)}",
+            what=f"{_name(body)} {LAWS[name].off.format(residual.error[row, body])}, "
+            f"of which noise and rounding explain {explained:.2g}; likely {self._cause(name, ~np.isnan(residual.error), wrong)}",
         )
 
     def _cause(self, name: str, compared: NDArray[np.bool_], wrong: NDArray[np.bool_]) -> str:

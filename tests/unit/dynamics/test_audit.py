@@ -90,6 +90,17 @@ def test_one_changed_value(played: Match, column: str, change: float, law: str) 
     assert "this value was changed" in deviations[0].what
 
 
+def test_a_type_that_changes_in_play_hides_nothing(played: Match) -> None:
+    """Another type in one frame leaves the player's movement out, and is itself what cannot be."""
+    players = copied(played.players)
+    players["type"][FRAME, SLOT] = (players["type"][FRAME, SLOT] + 1) % 18
+    players["x"][FRAME, SLOT] += 5.0
+    [deviation] = [one for one in found(played, players=players) if one.law.name == "physics-type"]
+    assert deviation.rows == 2
+    assert deviation.cycle == played.frames["cycle"][FRAME]
+    assert "left 6 has type" in deviation.what
+
+
 @pytest.mark.parametrize(
     ("stated", "law", "cause"),
     [

@@ -253,12 +253,13 @@ class _Judge:
             return
         row, body = (int(place) for place in np.argwhere(wrong)[0])
         explained = residual.noise[row, body] + residual.rounding[row, body]
+        off = LAWS[name].off.format(residual.error[row, body])
+        cause = self._cause(name, ~np.isnan(residual.error), wrong)
         yield Deviation(
             law=LAWS[name],
             rows=int(wrong.sum()),
             cycle=int(self.match.frames["cycle"][self.at[row] + 1]),
-            what=f"{_name(body)} {LAWS[name].off.format(residual.error[row, body])}, "
-            f"of which noise and rounding explain {explained:.2g}; likely {self._cause(name, ~np.isnan(residual.error), wrong)}",
+            what=f"{_name(body)} {off}, of which noise and rounding explain {explained:.2g}; likely {cause}",
         )
 
     def _cause(self, name: str, compared: NDArray[np.bool_], wrong: NDArray[np.bool_]) -> str:

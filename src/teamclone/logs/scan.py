@@ -279,7 +279,7 @@ def _hexadecimal(buffer: Bytes, start: int, stop: int) -> tuple[int, int]:
 
 @_helper
 def _is_blank(byte: int) -> bool:
-    return byte == 32 or byte == 9 or byte == 13
+    return byte == 32 or 9 <= byte <= 13
 
 
 @_helper
@@ -900,6 +900,13 @@ def _same(buffer: Bytes, start: int, stop: int, name: Bytes) -> bool:
     return True
 
 
+@_helper
+def _goes_on(buffer: Bytes, start: int, stop: int) -> bool:
+    """Whether a line belongs to the message before it: a client may send line breaks, which the server logs as such."""
+    start = _blank(buffer, start, stop)
+    return start < stop and _byte(buffer, start) == 40
+
+
 @_kernel
 def scan_commands(
     buffer: Bytes,
@@ -922,7 +929,7 @@ def scan_commands(
     """Read the lines of a command log.
 
     Args:
-        buffer: the log; starts, stops: (n_lines,) its lines.
+        buffer: the log; starts, stops: (n_lines,) its lines. A message may go on in lines that have no stamp.
         left, right: team names; a line whose sender is neither is marked as a stranger's and not read.
         integers .. texts: filled, one value a command; integers is (4, capacity): time, stoppage, line, order; args
             (4, capacity); texts (2, capacity): where the text begins and ends. The capacity must be at least the
@@ -938,6 +945,7 @@ def scan_commands(
     for index in range(12):
         for side in range(3):
             last[side, index, 0] = -1
+    behind = _int(0)  # the line behind the message that was read last
     for line in range(len(starts)):
         stop = stops[line]
         if stop > starts[line] and _byte(buffer, stop - 1) == 13:
@@ -945,6 +953,8 @@ def scan_commands(
         line_classes[line] = _LINE_OTHER
         line_stamps[line, 0] = -1
         line_stamps[line, 1] = -1
+        if line < behind:
+            continue
         if _blank(buffer, starts[line], stop) == stop:
             continue
         cycle, stoppage, position = _stamp(buffer, starts[line], stop)
@@ -990,6 +1000,10 @@ def scan_commands(
                 continue
         position += 1
         broken = False
+        behind = line + 1
+        while behind < len(starts) and _goes_on(buffer, starts[behind], stops[behind]):
+            stop = stops[behind]
+            behind += 1
         if last[side + 1, unum, 0] != cycle or last[side + 1, unum, 1] != stoppage:
             last[side + 1, unum, 0] = cycle
             last[side + 1, unum, 1] = stoppage

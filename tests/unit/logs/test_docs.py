@@ -36,7 +36,8 @@ def table(heading: str) -> set[str]:
 
 
 def test_each_problem_is_in_the_table():
-    source = "".join(path.read_text() for path in sorted((ROOT / "src/teamclone/logs").glob("*.py")))
+    package = ROOT / "src" / "teamclone"
+    source = "".join(path.read_text() for path in (*(package / "logs").glob("*.py"), package / "store/convert.py"))
     codes = set(re.findall(r'code="([a-z-]+)"', source)) | set(re.findall(r'warn\("([a-z-]+)"', source))
     codes |= set(re.findall(r'code="[a-z-]+" if \w+ else "([a-z-]+)"', source))
     assert codes == table("Problems")

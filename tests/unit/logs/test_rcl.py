@@ -164,7 +164,6 @@ def test_servers_12_stamp_without_the_stoppage_counter():
         ("10,0\tRecv C_3: (turn 1)", "unknown-sender"),
         ("10,0\tRecv A_12: (turn 1)", "odd-line"),
         ("10,0\tRecv A_0: (turn 1)", "odd-line"),
-        ("(turn 1)", "odd-line"),
         ("x,0\tRecv A_1: (turn 1)", "odd-line"),
     ],
 )
@@ -173,6 +172,24 @@ def test_lines_that_are_left_out_and_named(line: str, code: str):
     assert log.commands["arg0"].tolist() == [5, 6]
     (problem,) = log.problems
     assert (problem.code, problem.line) == (code, 2)
+
+
+def test_a_message_goes_on_in_lines_without_a_stamp():
+    """A client may send line breaks between commands; the server runs all of them and logs the message as it came."""
+    log = read(
+        *("(turn 1)", "9,0\tRecv A_1: (change_view wide)", "  (dash 60)", "(turn_neck 5)", "10,0\tRecv A_2: (turn 6)"),
+        *("", "(dash 7)"),
+    )
+    kinds = [CommandKind(kind).name for kind in log.commands["kind"]]
+    assert kinds == ["CHANGE_VIEW", "DASH", "TURN_NECK", "TURN"]
+    assert log.commands["line"].tolist() == [2, 2, 2, 5]
+    assert log.commands["order"].tolist() == [0, 1, 2, 0]
+    assert log.commands["valid"].all()
+    assert log.commands["cycle"].tolist() == [9, 9, 9, 10]
+    # Nothing comes before the first, and a blank line ends a message.
+    (problem,) = log.problems
+    assert (problem.code, problem.line) == ("odd-line", 1)
+    assert problem.text.startswith("2 line(s)")
 
 
 @pytest.mark.parametrize("data", [b"", b"\n\n", b"ULG6\n(show 1", b"hello\tworld\n"])

@@ -26,6 +26,8 @@ from teamclone.rcss.playmodes import BY_NAME
 
 _PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')
 _TEAM = re.compile(rb"\(team (\d+) (\S+) (\S+) (-?\d+) (-?\d+)(?: (\d+) (\d+) (\d+) (\d+))?\)\s*$")
+_RESULT = b'"(result '
+"""In the message that the server logs as it closes."""
 _PLAYMODE = re.compile(rb"\(playmode (\d+) (\w+)\)\s*$")
 _PIECE = 1 << 17
 
@@ -44,12 +46,17 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
         path: its name, for messages.
 
     Raises:
-        LogError: there is not one good frame.
+        LogError: there is not one good frame, though the match began.
     """
     buffer = np.frombuffer(data, np.uint8)
     starts, stops = line_bounds(buffer)
     shows = np.flatnonzero(_begins(buffer, starts, stops, b"(show "))
     problems: list[Problem] = []
+    if not len(shows):
+        if _RESULT not in data:
+            raise LogError("holds no frame: expected lines '(show ...)' behind the header", path=path)
+        text = "holds no frame: the server was closed before the match began"
+        problems.append(Problem(code="never-began", severity=Severity.NOTE, text=text, path=path))
     frames, players, good = _scan(buffer, starts[shows], stops[shows], shows, problems, path=path)
     frame_of_line = np.cumsum(good)
     modes: list[tuple[int, int]] = []
@@ -71,7 +78,7 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
         elif match := _TEAM.match(line):
             teams.append(_team_mark(frame, match))
         elif line.startswith(b"(msg "):
-            finished = finished or b'"(result ' in line
+            finished = finished or _RESULT in line
         elif line.startswith(b"(server_param "):
             server_params = parameters(line)
         elif line.startswith(b"(player_param "):
@@ -215,12 +222,8 @@ def _scan(
                 cycle=int(shows.cycle[first]) if shows.cycle[first] >= 0 else None,
             )
         )
-    if not n_good:
-        raise LogError(
-            "holds no frame: expected lines '(show ...)' behind the header" if n == 0 else str(problems[-1].text),
-            path=path,
-            line=int(lines[0]) + 1 if n else None,
-        )
+    if n and not n_good:
+        raise LogError(str(problems[-1].text), path=path, line=int(lines[0]) + 1)
     keep = slice(None) if n_good == n else good
     players = {name: column[keep] for name, column in shows.players.items()}
     return {"cycle": shows.cycle[keep], "ball": shows.ball[keep]}, players, good

@@ -342,7 +342,7 @@ def _foreign(game: GameLog, log: CommandLog) -> bool:
 
 def _oddities(game: GameLog, source: _Source | None) -> list[Problem]:
     """Return oddities of the match itself: an unfinished log, absent teams, players that left."""
-    if source is None:
+    if source is None or not len(game.frames["cycle"]):
         return []
     path = source.path
     problems = []

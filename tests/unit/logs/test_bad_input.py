@@ -239,6 +239,29 @@ def test_a_lone_command_log_has_the_goals_that_the_referee_announced(tmp_path: P
     assert (match.left.score, match.right.score) == (1, 2)
 
 
+NEVER_BEGAN = b"ULG5\n(server_param (half_time 300))\n(player_param (player_types 18))\n(team 1 Alpha null 0 0)\n"
+
+
+def test_a_server_that_was_closed_before_the_match_began(tmp_path: Path):
+    """A whole log without a frame is no damage, and its commands are kept; a log that breaks off there is."""
+    path = tmp_path / "x.rcg"
+    path.write_bytes(NEVER_BEGAN + b'(msg 0 1 "(result 202001010000 Alpha_0-vs-null)")\n')
+    (tmp_path / "x.rcl").write_text("0,0\tRecv Alpha_1: (move -10 0)\n")
+    match = read_match(path)
+    assert (match.rcg_path, match.left.name, match.right.name) == (path, "Alpha", None)
+    assert [(problem.code, str(problem.severity)) for problem in match.problems] == [("never-began", "note")]
+    assert match.game.complete
+    assert match.players["x"].shape == (0, 22)
+    assert match.commands["frame"].tolist() == [-1]
+    tables = tables_of(match)
+    assert (tables["frames"].num_rows, tables["commands"].num_rows) == (0, 1)
+    (tmp_path / "x.rcl").unlink()
+    assert tables_of(read_match(path))["commands"].num_rows == 0
+    path.write_bytes(NEVER_BEGAN)
+    with pytest.raises(LogError, match="holds no frame"):
+        read_match(path)
+
+
 def test_archives_are_to_be_unpacked(rcg_of: Callable[[str], Path], tmp_path: Path):
     import tarfile
 

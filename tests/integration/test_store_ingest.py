@@ -20,6 +20,7 @@ from command import teamclone
 from disk import small_disk
 from teamclone.errors import LogError, StoreError, UsageError
 from teamclone.logs import LogPair
+from teamclone.logs.columns import Source
 from teamclone.store import Store, create_store, ingest, open_store
 from teamclone.store import ingest as ingest_function
 from teamclone.store.status import FileOutcome
@@ -110,11 +111,12 @@ def test_a_command_log_that_comes_later_is_added(logs: Path, store: Store) -> No
     commands = logs / f"{PLAIN}.rcl.gz"
     held = commands.rename(logs / "held")
     assert ingest([logs], store).added == 1
-    assert store.matches()["n_commands"].to_pylist() == [0]
+    assert store.sql("select distinct source from commands")["source"].to_pylist() == [int(Source.RECOVERED)]
     held.rename(commands)
     report = ingest([logs], store)
     assert (report.added, report.replaced) == (0, 1)
     assert store.matches()["n_commands"].to_pylist() == [30511]
+    assert store.sql("select distinct source from commands")["source"].to_pylist() == [int(Source.LOGGED)]
 
 
 def test_a_game_log_that_grows_replaces_its_match(logs: Path, store: Store) -> None:

@@ -20,7 +20,8 @@ from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.dynamics.inverse.columns import recovered_commands
 from teamclone.errors import DatasetError, UsageError, choose
-from teamclone.logs.columns import INTERVALS, Source, counter_name
+from teamclone.logs.columns import COMMANDS, INTERVALS, Source, counter_name
+from teamclone.logs.match import empty_columns
 from teamclone.rcss import server_params
 from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
@@ -302,7 +303,10 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     players = store.read_match_columns(match_id, "player_states", columns=PLAYER_COLUMNS)
     if task.recover:
         players |= store.read_match_columns(match_id, "player_states", columns=[counter_name(CommandKind.TURN_NECK)])
-        commands, _ = recovered_commands(frames, players, types=types, params=params)
+        try:
+            commands, _ = recovered_commands(frames, players, types=types, params=params)
+        except UsageError:  # its game log says too little: no samples, as of a match that has no commands
+            commands = empty_columns((*COMMANDS, *INTERVALS), 0)
     else:
         intervals = [column.name for column in INTERVALS] if task.entry.source is Source.RECOVERED else []
         commands = store.read_match_columns(match_id, "commands", columns=(*clean.COMMAND_COLUMNS, *intervals))
@@ -346,7 +350,7 @@ def _entries(store: Store, config: DatasetConfig) -> _Entries:
     teams: Counter[str] = Counter()
     rows = store.matches().to_pylist()
     in_play = "n_frames" if config.set_plays else "n_play_on_frames"
-    lacking: set[str] = set()
+    usable: list[_Entry] = []
     for row in rows:
         left, right = row["left_name"], row["right_name"]
         teams.update(name for name in (left, right) if name)
@@ -362,8 +366,8 @@ def _entries(store: Store, config: DatasetConfig) -> _Entries:
                 source=sources.get((row["match_id"], side)),
             )
             entries.append(entry)
-            if not row[in_play] or not _gives_commands(entry, config.source):
-                lacking.add(entry.match_id)
+            if row[in_play] and _gives_commands(entry, config.source):
+                usable.append(entry)
     for name in config.teams:
         if name not in teams:
             raise UsageError(f"team {name!r} is in no match of the store; {choose(name, sorted(teams))}")
@@ -372,10 +376,11 @@ def _entries(store: Store, config: DatasetConfig) -> _Entries:
         if name not in opponents:
             remedy = choose(name, sorted(opponents))
             raise UsageError(f"unseen opponent {name!r} plays in no match of {config.team}; {remedy}")
-    entries.sort(key=lambda entry: entry.match_id)
+    taken = {entry.match_id for entry in usable}
+    left_out = {entry.match_id: entry.name for entry in entries if entry.match_id not in taken}
     return _Entries(
-        usable=[entry for entry in entries if entry.match_id not in lacking],
-        without_commands=tuple(dict.fromkeys(entry.name for entry in entries if entry.match_id in lacking)),
+        usable=sorted(usable, key=lambda entry: entry.match_id),
+        without_commands=tuple(name for _, name in sorted(left_out.items())),
         without_team=len(rows) - len({entry.match_id for entry in entries}),
     )
 

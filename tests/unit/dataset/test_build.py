@@ -24,6 +24,7 @@ import pytest
 import torch
 
 from disk import small_disk
+from teamclone.dataset import build
 from teamclone.dataset.build import DatasetConfig, Sources, SplitBy, build_dataset, is_current
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
@@ -305,7 +306,7 @@ def test_sources_of_commands(mixed: Store, tmp_path: Path, source: Sources, sour
     report = build_dataset(config, store=mixed, out=tmp_path / "ds", jobs=1)
     assert [match["source"] for match in report["matches"]] == sources
     # Every split has rows: those without commands are in none.
-    assert len(report["matches_without_commands"]) == 1  # the three have one name
+    assert len(report["matches_without_commands"]) == without
     assert len(mixed.match_ids()) - len(report["matches"]) == without
     assert all(sum(report["rows"][split].values()) for split in ("train", "validation", "test"))
     dataset = open_dataset(tmp_path / "ds")
@@ -326,6 +327,31 @@ def test_sources_of_commands(mixed: Store, tmp_path: Path, source: Sources, sour
     dashes = recovered & (target.kind == 0)
     width = target.interval[dashes, 0, 1] - target.interval[dashes, 0, 0]
     assert 0 < float(width.median()) < 1
+
+
+def test_a_match_of_two_teams_of_which_one_did_nothing(tmp_path: Path, fixtures_dir: Path) -> None:
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match = read_match(log)
+    assert match.log is not None
+    ours = {name: values[match.commands["side"] >= 0] for name, values in match.log.commands.items()}
+    made = create_store(tmp_path / "store")
+    made.add(dataclasses.replace(match, log=dataclasses.replace(match.log, commands=ours)))
+    config = DatasetConfig(teams=(match.left.name or "", match.right.name or ""), test=0, validation=0)
+    report = build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    assert [row["side"] for row in report["matches"]] == ["left"]
+    assert report["matches_without_commands"] == []
+
+
+def test_a_game_log_that_implies_nothing_costs_no_other(
+    mixed: Store, config: DatasetConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*arguments: object, **options: object) -> None:
+        raise UsageError("says too little")
+
+    monkeypatch.setattr(build, "recovered_commands", fails)
+    config = dataclasses.replace(config, source=Sources.RECOVERED)
+    report = build_dataset(config, store=mixed, out=tmp_path / "ds", jobs=1)
+    assert [sum(match["rows"].values()) > 0 for match in report["matches"]] == [False, True] * 3
 
 
 def test_recovered_when_ingested_or_when_cleaned_is_the_same(

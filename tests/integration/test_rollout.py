@@ -14,6 +14,7 @@ import pytest
 
 import teamclone as tc
 from command import teamclone
+from teamclone.report.page import fresh_rollouts
 from teamclone.training.config import load_config
 
 SETTINGS = (
@@ -90,11 +91,42 @@ def test_the_report_shows_them(run: Path, log: Path, tmp_path: Path) -> None:
     assert f"From {STARTS} moments of one match the clone plays its team on" in page
     assert f"<td>{document['ahead']['samples']['ball'][0]['fde']:.2f}</td>" in page
     assert page.count(f", {HORIZON} cycles ahead</text>") == STARTS
-    # Those of other weights are not shown.
-    found = json.loads((tmp_path / "run" / "rollouts" / "rollouts.json").read_text())
-    (tmp_path / "run" / "rollouts" / "rollouts.json").write_text(json.dumps(found | {"model_id": "0" * 16}))
-    teamclone(*report)
-    assert "Not played yet" in (tmp_path / "run" / "report.html").read_text()
+    # Those of other weights, and what somebody damaged, are not shown. A call that fails leaves them as they are.
+    folder = tmp_path / "run" / "rollouts"
+    whole = {name: (folder / name).read_text() for name in ("rollouts.json", "fans.json")}
+    failed = teamclone("rollout", tmp_path / "run", log, *SIZE, "--from-cycle", 99999, code=1)
+    assert "no play_on goes on from cycle 99999" in failed.stderr
+    assert {name: (folder / name).read_text() for name in whole} == whole
+    opened = tc.load(tmp_path / "run").run
+    assert fresh_rollouts(opened, checkpoint="best-loss") is not None
+    for name, change in (
+        *(
+            ("rollouts.json", change)
+            for change in ({"model_id": "0" * 16}, {"ahead": 5}, {"ahead": {}}, {"matches": 3})
+        ),
+        ("rollouts.json", {"options": None}),
+        ("rollouts.json", {"ahead": {"samples": {"players": [{}]}}}),
+        *(("fans.json", {"fans": fans}) for fans in (5, [{}], [5])),
+    ):
+        (folder / name).write_text(json.dumps(json.loads(whole[name]) | change))
+        assert fresh_rollouts(opened, checkpoint="best-loss") is None, (name, change)
+        (folder / name).write_text(whole[name])
+
+
+def test_starts_by_cycle(run: Path, log: Path, tmp_path: Path) -> None:
+    cycles = ("--from-cycle", 300, "--from-cycle", 301)
+    rolled_out(run, log, *SIZE, *cycles, "--out", tmp_path, "--ball", "touched")
+    fans = json.loads((tmp_path / "fans.json").read_text())["fans"]
+    assert sorted(fan["cycle"] for fan in fans) == [300, 301]
+
+
+def test_a_ball_as_logged(run: Path, log: Path, tmp_path: Path) -> None:
+    document = rolled_out(run, log, *SIZE, "--ball", "logged", "--out", tmp_path)
+    assert [row["fde"] for row in document["ahead"]["samples"]["ball"]] == pytest.approx([0.0] * 3, abs=1e-4)
+    assert document["ahead"]["samples"]["players"][0]["fde"] > 0
+    agreement = [row["agreement"] for row in document["ahead"]["likeliest"]["players"]]
+    assert all(0 <= share <= 1 for share in agreement)
+    assert document["realism"]["samples"]["speed of the ball"] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("others", ["logged", "last", "clone"])
@@ -141,6 +173,7 @@ def test_a_log_without_player_types(run: Path, log: Path, tmp_path: Path) -> Non
     ("options", "expected"),
     [
         (("--others", "friends"), "--others 'friends' is unknown, choose one of: logged, last, clone:RUN"),
+        (("--ball", "round"), "--ball 'round' is unknown, choose one of: free, touched, logged"),
         (("--team", "Red", "--side", "left"), "name either a team or a side"),
         (("--horizon", 0), "Invalid value for '--horizon'"),
     ],

@@ -141,7 +141,7 @@ def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
     )
     print(f"{report['turn_zero']:,} rows are (turn 0).")
     if report["recovered"]:
-        print(f"{report['recovered']:,} rows are recovered: game logs imply them, no command log has them.")
+        print(f"{report['recovered']:,} rows are recovered: they are what game logs imply.")
     if without := report["matches_without_commands"]:
         names = ", ".join(without[:3]) + (", ..." if len(without) > 3 else "")
         print(f"{len(without)} match(es) have no commands to take and are in no split: {names}.")

@@ -14,14 +14,6 @@ from teamclone.cli.common import fail, print_json, print_table, progress
 if TYPE_CHECKING:
     from teamclone.rollouts.run import MatchRollouts
 
-_WHO = {
-    "samples": "clone, samples",
-    "likeliest": "clone, likeliest",
-    "last": "go on as in the last cycle",
-    "coast": "coast",
-    "stand": "stand",
-}
-
 
 def rollout(
     run: Annotated[Path, typer.Argument(help="Run folder made by `teamclone train`.")],
@@ -92,7 +84,7 @@ def rollout(
     if as_json:
         print_json(document)
     elif document["ahead"]:
-        print_table(*_table(document["ahead"]), numeric=range(1, 50))
+        print_table(*_table(document["ahead"], ball=ball != "logged"), numeric=range(1, 50))
         print(_realism(document["realism"]))
         print(f"Wrote {out}")
     failed = [match for match in found if match.error is not None]
@@ -114,32 +106,31 @@ def _watched(roll_out: Callable[..., list[MatchRollouts]]) -> list[MatchRollouts
 
 def _realism(scores: dict[str, dict[str, float]]) -> str:
     """Return the realism of the samples between floor and ceiling, in one line."""
-    names = {
-        "samples": "clone",
-        "coast": "coast",
-        "last": "go on as in the last cycle",
-        "other matches": "other matches",
-    }
+    from teamclone.rollouts.run import MOVERS
+
+    names = {name: MOVERS.get(name, name) for name in ("samples", "coast", "last", "other matches")}
     shown = [f"{who} {scores[name]['all']:.3f}" for name, who in names.items() if name in scores]
     return f"realism, 1 is as logged: {', '.join(shown)}"
 
 
-def _table(ahead: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Return headers and rows: mean final displacement in metres by cycles ahead."""
+def _table(ahead: dict[str, Any], *, ball: bool) -> tuple[list[str], list[list[str]]]:
+    """Return headers and rows by cycles ahead: mean final displacement in metres, then how many commands agree.
+
+    Args:
+        ball: whether there are rows of the ball.
+    """
+    from teamclone.rollouts.run import MOVERS
+
     cycles = [row["cycles"] for row in ahead["samples"]["players"]]
     headers = ["mean final displacement, m", *(f"{ahead_by} ahead" for ahead_by in cycles)]
     rows = []
-    for group in ("players", "ball"):
-        for name, who in _WHO.items():
+    for group in ("players", "ball") if ball else ("players",):
+        for name, who in MOVERS.items():
             found = {row["cycles"]: row["fde"] for row in ahead[name][group]}
             rows.append(
                 [f"{group}: {who}", *(f"{found[one]:.2f}" if found.get(one) is not None else "" for one in cycles)]
             )
     agreement = {row["cycles"]: row["agreement"] for row in ahead["likeliest"]["players"]}
-    rows.append(
-        [
-            "its command is that of the log",
-            *(f"{agreement[one]:.3f}" if agreement[one] is not None else "" for one in cycles),
-        ]
-    )
+    shares = ["" if agreement[one] is None else f"{100 * agreement[one]:.1f} %" for one in cycles]
+    rows.append(["commands of the kind that the log has", *shares])
     return headers, rows

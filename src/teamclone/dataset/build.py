@@ -35,6 +35,8 @@ AHEAD = 64
 """Cleaned matches that a cluster may hold ready, about 300 MB: more than one writer takes in a second."""
 
 
+_WITHOUT_COUNTERS = ("1", "2")
+"""Versions of game logs that do not show which commands were executed."""
 MAX_SHARE = 0.9
 """Of the matches, for test or validation."""
 
@@ -198,7 +200,9 @@ def build_dataset(
             of_rows, name = _split_of_rows(match, task.entry, splits[task.entry.match_id], config)
             _add(writer, match, index=len(matches), split=of_rows)
             np.add.at(rows, (of_rows, match.samples["kind"]), 1)
-            row = _report_match(task, match, split=name, repertoire=config.repertoire)
+            row = _report_match(
+                task.entry, match, source=_source_of(task.entry, config), split=name, repertoire=config.repertoire
+            )
             matches.append(row if len(config.teams) == 1 else {"team": task.entry.team, **row})
             parameters.append(of_match)
             if on_progress is not None:
@@ -223,7 +227,7 @@ def _tasks(
             entry=entry,
             commands=config.commands,
             turn_zero=config.turn_zero,
-            recover=config.source is Sources.RECOVERED and entry.source is Source.LOGGED,
+            recover=config.source is Sources.RECOVERED and entry.source is not Source.RECOVERED,
             goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
             repertoire=config.repertoire,
         )
@@ -243,6 +247,11 @@ def _split_of_rows(
 
 def _nothing_left(out: Path, config: DatasetConfig, report: dict[str, Any]) -> DatasetError:
     left = "; ".join(f"{rule['name']}: {rule['after']}" for rule in report["rules"])
+    if config.source is Sources.LOGGED and not report["matches"]:
+        return DatasetError(
+            f"{out}: no match has logged commands of {config.team}; add the command logs, or take what game logs imply "
+            "with --source any"
+        )
     return DatasetError(
         f"{out}: no command of {config.team} is left after cleaning ({left or 'no match has any'}). "
         "Without a command log there are only the commands that the game log shows, and logs before version 3 do not "
@@ -271,10 +280,16 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
         meta = open_dataset(folder).meta
     except DatasetError:
         return False
-    entries = _entries(store, config).usable
-    there = [match["match_id"] for match in meta["matches"]]
+    wanted = [(entry.match_id, _source_of(entry, config)) for entry in _entries(store, config).usable]
+    there = [(match["match_id"], match["source"]) for match in meta["matches"]]
     options = json.loads(json.dumps(_options(config)))
-    return meta["options"] == options and there == [entry.match_id for entry in entries]
+    return meta["options"] == options and there == wanted
+
+
+def _source_of(entry: _Entry, config: DatasetConfig) -> str:
+    """Return the word for where the commands of an entry are taken from."""
+    source = Source.RECOVERED if config.source is Sources.RECOVERED or entry.source is None else entry.source
+    return source.name.lower()
 
 
 def _options(config: DatasetConfig) -> dict[str, Any]:
@@ -366,7 +381,7 @@ def _entries(store: Store, config: DatasetConfig) -> _Entries:
                 source=sources.get((row["match_id"], side)),
             )
             entries.append(entry)
-            if row[in_play] and _gives_commands(entry, config.source):
+            if row[in_play] and _gives_commands(entry, row, config):
                 usable.append(entry)
     for name in config.teams:
         if name not in teams:
@@ -385,10 +400,14 @@ def _entries(store: Store, config: DatasetConfig) -> _Entries:
     )
 
 
-def _gives_commands(entry: _Entry, wanted: Sources) -> bool:
-    if wanted is Sources.LOGGED:
+def _gives_commands(entry: _Entry, row: Mapping[str, Any], config: DatasetConfig) -> bool:
+    """Return whether there are commands to take in a match, whose row of ``matches`` this is."""
+    if config.commands is Commands.EXECUTED and row["log_version"] in _WITHOUT_COUNTERS:
+        return False
+    if config.source is Sources.LOGGED:
         return entry.source is Source.LOGGED
-    return entry.source is not None
+    # A command log may lack a side of which the game log knows.
+    return entry.source is not None or (config.source is Sources.RECOVERED and row["command_log"] is not None)
 
 
 def _sources(store: Store, repertoire: Sequence[str]) -> dict[tuple[str, int], Source]:
@@ -437,16 +456,16 @@ def _pad_types(types: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
     return padded
 
 
-def _report_match(task: _Task, match: MatchSamples, *, split: str, repertoire: Sequence[str]) -> dict[str, Any]:
-    entry = task.entry
-    source = Source.RECOVERED if task.recover else entry.source
+def _report_match(
+    entry: _Entry, match: MatchSamples, *, source: str, split: str, repertoire: Sequence[str]
+) -> dict[str, Any]:
     return {
         "match_id": entry.match_id,
         "name": entry.name,
         "opponent": entry.opponent,
         "side": "left" if entry.side > 0 else "right",
         "split": split,
-        "source": "none" if source is None else source.name.lower(),
+        "source": source,
         "frames": len(match.frames["cycle"]),
         "rows": _by_kind(np.bincount(match.samples["kind"], minlength=len(repertoire)), repertoire),
         "executed": int(match.samples["executed"].sum()),

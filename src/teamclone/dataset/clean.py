@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from teamclone.dataset import layout
 from teamclone.dynamics.commands import used_arguments
 from teamclone.logs import columns
-from teamclone.logs.align import executed_commands, executed_kind, first_body_commands, slot_of
+from teamclone.logs.align import executed_commands, executed_kind, first_body_commands, follows, slot_of
 from teamclone.logs.columns import counter_name
 from teamclone.logs.match import Columns
 from teamclone.rcss import state_bits
@@ -268,9 +268,9 @@ def _with_none(samples: Columns, nothing: NDArray[np.bool_], *, kind: int) -> Co
 def _nothing(frames: Columns, players: Columns) -> NDArray[np.bool_]:
     """Return (n_frames, 22) whether the counters show that a player issued no command.
 
-    A log that lost commands shows it of no player.
+    A log that lost commands shows it of no player, nor does a frame without a direct successor.
     """
-    nothing: NDArray[np.bool_] = executed_kind(frames, players) == 0
+    nothing: NDArray[np.bool_] = (executed_kind(frames, players) == 0) & follows(frames)[:, None]
     nothing &= players[counter_name(CommandKind.DASH)] >= 0
     return nothing
 

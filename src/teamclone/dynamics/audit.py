@@ -195,13 +195,8 @@ def _missing_frames(frames: Columns, rules: Rules) -> Iterator[Deviation]:
     The last cycle of a half has none, since it is one of before_kick_off.
     """
     cycle = frames["cycle"].astype(np.int64)
-    halves = [
-        round(rules.server[name] * 1000.0 / rules.server["simulator_step"]) for name in ("half_time", "extra_half_time")
-    ]
-    normal = halves[0] * round(rules.server["nr_normal_halfs"])
     gap = np.diff(cycle)
-    last = cycle[:-1] + 1
-    ends = (last % max(halves[0], 1) == 0) | ((last > normal) & ((last - normal) % max(halves[1], 1) == 0))
+    ends = rules.ends_half(cycle[:-1] + 1)
     missing = np.where((gap == 2) & ends, 0, np.maximum(gap - 1, 0))
     if missing.any():
         first = int(np.flatnonzero(missing)[0])

@@ -74,6 +74,17 @@ class Rules:
             referee=not params.get("coach") or bool(params.get("coach_w_referee")),
         )
 
+    def ends_half(self, cycle: NDArray[Any]) -> NDArray[np.bool_]:
+        """Return whether cycles, any shape, are the last of a half: behind them there is a pause."""
+        normal, extra = (
+            max(round(self.server[name] * 1000.0 / self.server["simulator_step"]), 1)
+            for name in ("half_time", "extra_half_time")
+        )
+        whole = normal * round(self.server["nr_normal_halfs"])
+        beyond = cycle - whole
+        ends: NDArray[np.bool_] = (cycle > 0) & ((cycle % normal == 0) | ((beyond > 0) & (beyond % extra == 0)))
+        return ends
+
     @property
     def catches_fail(self) -> bool:
         """Whether a failed catch within reach moves the ball, and bans the goalkeeper from catching."""
@@ -88,6 +99,7 @@ class Rules:
 _MOST = 1e7
 """No parameter of a match is greater."""
 _DECAYS = ("ball_decay", "player_decay")
+_SHARES = ("player_rand", "ball_rand")
 _POSITIVE = (
     "ball_size",
     "player_size",
@@ -111,16 +123,23 @@ def _check(server: Mapping[str, float], types: Mapping[str, NDArray[np.float64]]
         low, high, words = -_MOST, _MOST, f"a number within {_MOST:.0e}"
         if name in _DECAYS:
             low, high, words = np.nextafter(0.0, 1.0), np.nextafter(1.0, 0.0), "more than 0 and less than 1"
+        elif name in _SHARES:
+            low, high, words = 0.0, np.nextafter(1.0, 0.0), "at least 0 and less than 1"
         elif name in _POSITIVE:
             low, words = np.nextafter(0.0, 1.0), f"more than 0 and at most {_MOST:.0e}"
         # Written so that NaN is wrong.
         wrong = ~((given >= low) & (given <= high))
         if wrong.any():
             raise UsageError(f"expected {name} to be {words}, got {given[wrong][0]:g}")
+    if 0 < server["dash_angle_step"] < _FINEST_STEP:
+        step = server["dash_angle_step"]
+        raise UsageError(f"expected a dash_angle_step of 0 or at least {_FINEST_STEP:g} degrees, got {step:g}")
     fastest = 100.0 * np.abs(types["dash_power_rate"]).max(initial=0.0)
     if fastest > _FASTEST_DASH:
         raise UsageError(f"expected a dash_power_rate of at most {_FASTEST_DASH / 100:g}, got {fastest / 100:g}")
 
 
+_FINEST_STEP = 0.1
+"""Degrees between the directions of dashes: a tenth of that of the latest servers. Each of them is looked at."""
 _FASTEST_DASH = 10.0
 """Metres per cycle of a dash with all power: ten times what a server draws."""

@@ -140,6 +140,7 @@ def _about(data: Dataset) -> dict[str, Any]:
         "team": data.meta["team"],
         "teams": data.meta.get("teams", [data.meta["team"]]),
         "matches": data.matches,
+        "recovered": data.meta.get("recovered", 0),
         "cleaning": _without_matches(data.meta.get("cleaning")),
         "options": data.meta.get("options"),
     }

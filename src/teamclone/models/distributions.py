@@ -20,6 +20,8 @@ LEAST_ANGLE = 0.03 * DEGREE
 LEAST_POWER = 0.03
 LEAST_PLACE = 0.03
 """Smallest scales: agents write arguments to the thousandth, and no density may run away."""
+LEAST_MASS = 1e-12
+"""Below this the probability of all clipped angles counts no less."""
 CLIPPED = 1e-2
 """An argument this close to its bound, in its unit, counts as clipped."""
 
@@ -97,7 +99,7 @@ def angle_terms(parts: Mixture, degrees: Tensor, *, factor: Tensor | None = None
     high = low + length
     over = (high - math.pi).clamp(min=0.0)
     mass = _mass(low, high - over, parts.scale) + _mass(torch.full_like(over, -math.pi), over - math.pi, parts.scale)
-    beyond = torch.log((mass / whole).clamp(min=1e-12))
+    beyond = torch.log((mass / whole).clamp(min=LEAST_MASS))
     clipped = (degrees.abs() >= 180.0 - CLIPPED) & (factor > 1.02)
     return torch.where(clipped[:, None], beyond, inside)
 

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from teamclone.models.distributions import CLIPPED, DEGREE, Mixture, wrap
+from teamclone.models.distributions import CLIPPED, DEGREE, LEAST_MASS, Mixture, wrap
 
 LEAST_WIDTH = 1e-3
 """Units and degrees, far below every scale: by so much intervals are taken as wider, so that none is without width."""
@@ -73,6 +73,8 @@ def angle_terms(parts: Mixture, span: Tensor, *, factor: Tensor | None = None) -
     inside = log_mass(low, (length - over).clamp(min=1e-9), parts.scale)
     around = log_mass(torch.full_like(low, -math.pi), over.clamp(min=1e-9), parts.scale)
     terms = torch.logaddexp(inside, around) - torch.log(whole) - torch.log(unit)[:, None]
+    if factor is not None:  # as of numbers that are clipped for sure
+        terms = torch.where((below | above)[:, None], terms.clamp(min=math.log(LEAST_MASS)), terms)
     return torch.where(torch.isfinite(span).all(1)[:, None], terms, 0.0)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import jinja2
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from teamclone.errors import RunError
 from teamclone.evaluation import bootstrap, metrics, paper
@@ -20,6 +21,7 @@ from teamclone.models.clone import model_id
 from teamclone.models.config import EgocentricPointConfig, PaperConfig
 from teamclone.report import figures
 from teamclone.rollouts.files import load_rollouts
+from teamclone.rollouts.run import MOVERS
 from teamclone.system.files import write_atomic
 from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
@@ -40,14 +42,6 @@ FIGURES = (
     ("macro_f1", "macro F1", "mean F1 of the commands"),
     ("paper_mae", "the paper's MAE", "mean absolute error of all six outputs, zeros included"),
 )
-MOVERS = {
-    "samples": "the clone, drawn",
-    "likeliest": "the clone, its likeliest commands",
-    "last": "as in the last cycle",
-    "coast": "coasting, no commands",
-    "stand": "standing still",
-}
-"""Who moves the players of roll-outs, as ``rollouts.json`` and as the page call them."""
 PITCHES = {4: "Four", 5: "Five", 6: "Six", 7: "Seven"}
 PERCENT = {"accuracy", "balanced_accuracy", "ece"}
 
@@ -298,39 +292,50 @@ def fresh_bench(run: Run, *, checkpoint: str) -> dict[str, Any] | None:
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
-    """The roll-outs of a run: ``rollouts.json``, and the fans that are drawn."""
+    """What the page shows of the roll-outs of a run.
 
-    document: dict[str, Any]
-    fans: list[dict[str, Any]]
+    Attributes:
+        starts: from how much they begin, in words. samples: of each start. others: see ``RolloutConfig``.
+        cycles: ahead, of the columns. tables: of ``players`` and the ``ball``: who moves the players, and the mean
+            displacement in metres by ``cycles``.
+        picture: the fans.
+    """
 
-    def rows(self, group: str) -> list[tuple[str, list[float | None]]]:
-        """Return (who moves the players, mean displacement in metres by `cycles`) of ``players`` or of the ``ball``."""
-        rows = []
-        for name, who in MOVERS.items():
-            found = {row["cycles"]: row["fde"] for row in self.document["ahead"][name][group]}
-            rows.append((who, [found.get(cycles) for cycles in self.cycles]))
-        return rows
+    starts: str
+    samples: int
+    others: str
+    cycles: list[int]
+    tables: dict[str, list[tuple[str, list[float | None]]]]
+    picture: Figure
 
-    @property
-    def cycles(self) -> list[int]:
-        """The cycles ahead of the columns."""
-        return [row["cycles"] for row in self.document["ahead"]["samples"]["players"]]
-
-    @property
-    def starts(self) -> str:
-        """From how much they begin, in words."""
-        counts = [match["starts"] for match in self.document["matches"] if match["starts"]]
-        return f"{sum(counts):,} moments of {'one match' if len(counts) == 1 else f'{len(counts)} matches'}"
+    @classmethod
+    def of(cls, document: Mapping[str, Any], fans: Sequence[Mapping[str, Any]]) -> Ahead:
+        """Return what ``rollouts.json`` and ``fans.json`` hold."""
+        counts = [match["starts"] for match in document["matches"] if match["starts"]]
+        ahead = document["ahead"]
+        cycles = [row["cycles"] for row in ahead["samples"]["players"]]
+        tables: dict[str, list[tuple[str, list[float | None]]]] = {}
+        for group in ("players", "ball"):
+            found = {name: {row["cycles"]: row["fde"] for row in ahead[name][group]} for name in MOVERS}
+            tables[group] = [(who, [found[name].get(one) for one in cycles]) for name, who in MOVERS.items()]
+        return cls(
+            starts=f"{sum(counts):,} moments of {'one match' if len(counts) == 1 else f'{len(counts)} matches'}",
+            samples=int(document["options"]["samples"]),
+            others=str(document["options"]["others"]),
+            cycles=cycles,
+            tables=tables,
+            picture=figures.fans(fans),
+        )
 
 
 def fresh_rollouts(run: Run, *, checkpoint: str) -> Ahead | None:
-    """Return the roll-outs in the run, if they are of these weights."""
+    """Return the roll-outs in the run, if they are whole and of these weights."""
     try:
         document, fans = load_rollouts(run.path / "rollouts")
-        fresh = document["model_id"] == model_id(run.load_model(checkpoint)) and document["ahead"]
-    except (RunError, KeyError):
+        fresh = document["model_id"] == model_id(run.load_model(checkpoint))
+        return Ahead.of(document, fans) if fresh else None
+    except (RunError, KeyError, TypeError, ValueError, AttributeError):  # what is damaged is not shown
         return None
-    return Ahead(document, fans) if fresh else None
 
 
 def trained_error(config: Config) -> str:
@@ -399,11 +404,8 @@ def _plots(
             ),
             f"Histogram of response times, half of them below {bench['single']['p50_us']:.0f} microseconds",
         )
-    if ahead is not None and ahead.fans:
-        drawn["fans"] = (
-            figures.fans(ahead.fans),
-            f"{len(ahead.fans)} pitches with sampled paths of players and ball, and the paths that they took",
-        )
+    if ahead is not None:
+        drawn["fans"] = (ahead.picture, "Pitches with sampled paths of players and ball, and the paths that they took")
     return {name: Markup(figures.svg(drawing, name=name, alt=alt)) for name, (drawing, alt) in drawn.items()}
 
 

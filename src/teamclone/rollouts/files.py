@@ -38,13 +38,14 @@ def write_rollouts(
 ) -> dict[str, Any]:
     """Write ``rollouts.json``, ``fans.json``, ``fans.svg`` and, if asked for, ``trajectories.parquet``.
 
+    Nothing is written if no match was rolled out; what an earlier call left then stays.
+
     Args:
         about: what else the document should say: run, checkpoint, model_id, team.
 
     Returns:
         The document.
     """
-    out.mkdir(parents=True, exist_ok=True)
     document = {
         "kind": "teamclone rollouts",
         "format": FORMAT,
@@ -64,17 +65,19 @@ def write_rollouts(
         "ahead": figures(matches),
         "realism": realism(matches),
     }
+    done = [match for match in matches if match.error is None]
+    if not done:
+        return document
+    out.mkdir(parents=True, exist_ok=True)
     write_document(out / "rollouts.json", document)
     # Those of an earlier call are of other roll-outs.
     for name in ("fans.json", "fans.svg", "trajectories.parquet"):
         (out / name).unlink(missing_ok=True)
-    done = [match for match in matches if match.error is None]
-    if done:
-        fans = fans_of(done)
-        write_document(out / "fans.json", {"format": FORMAT, "fans": fans})
-        write_atomic(out / "fans.svg", _picture(fans))
-        if trajectories:
-            _write_trajectories(out / "trajectories.parquet", done)
+    fans = fans_of(done)
+    write_document(out / "fans.json", {"format": FORMAT, "fans": fans})
+    write_atomic(out / "fans.svg", _picture(fans))
+    if trajectories:
+        _write_trajectories(out / "trajectories.parquet", done)
     return document
 
 

@@ -33,6 +33,14 @@ from teamclone.world.world import World
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
 
+MOVERS = {
+    "samples": "clone, samples",
+    "likeliest": "clone, likeliest",
+    "last": "go on as in the last cycle",
+    "coast": "coast",
+    "stand": "stand",
+}
+"""Who moves the players, in words, by the keys of `MatchRollouts.places`."""
 MOST_WORLDS = 512
 """Worlds that go ahead together; bounds memory."""
 

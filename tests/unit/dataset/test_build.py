@@ -354,6 +354,49 @@ def test_a_game_log_that_implies_nothing_costs_no_other(
     assert [sum(match["rows"].values()) > 0 for match in report["matches"]] == [False, True] * 3
 
 
+def test_a_command_log_that_comes_later_makes_a_dataset_old(
+    config: DatasetConfig, tmp_path: Path, fixtures_dir: Path
+) -> None:
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match, made = read_match(log), create_store(tmp_path / "store")
+    made.add(dataclasses.replace(match, log=None, rcl_path=None))
+    config = dataclasses.replace(config, test=0, validation=0)
+    build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    assert is_current(tmp_path / "ds", config, made)
+    made.add(match)
+    assert not is_current(tmp_path / "ds", config, made)
+    recovered = dataclasses.replace(config, source=Sources.RECOVERED)
+    build_dataset(recovered, store=made, out=tmp_path / "recovered", jobs=1)
+    assert is_current(tmp_path / "recovered", recovered, made)
+
+
+def test_a_side_that_its_command_log_lacks_is_recovered(tmp_path: Path, fixtures_dir: Path) -> None:
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match = read_match(log)
+    assert match.log is not None
+    ours = {name: values[match.commands["side"] >= 0] for name, values in match.log.commands.items()}
+    made = create_store(tmp_path / "store")
+    made.add(dataclasses.replace(match, log=dataclasses.replace(match.log, commands=ours)))
+    config = DatasetConfig(teams=(match.right.name or "",), test=0, validation=0)
+    with pytest.raises(DatasetError, match="no match has any"):
+        build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    config = dataclasses.replace(config, source=Sources.RECOVERED)
+    report = build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    assert report["recovered"] > 1000
+
+
+def test_logs_that_do_not_show_what_was_executed_are_in_no_split(tmp_path: Path, fixtures_dir: Path) -> None:
+    made = create_store(tmp_path / "store")
+    for name in ("native-v1", "native-v2", "v6"):
+        (log,) = (fixtures_dir / name).glob("*.rcg*")
+        made.add(read_match(log))
+    teams = {row[side] for row in made.matches().to_pylist() for side in ("left_name", "right_name")} - {None}
+    config = DatasetConfig(teams=tuple(sorted(teams)), test=0, validation=0)
+    report = build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    assert len({row["match_id"] for row in report["matches"]}) == 1
+    assert len(report["matches_without_commands"]) == 2
+
+
 def test_recovered_when_ingested_or_when_cleaned_is_the_same(
     mixed: Store, config: DatasetConfig, tmp_path: Path
 ) -> None:
@@ -369,7 +412,7 @@ def test_nothing_but_matches_without_commands(mixed: Store, config: DatasetConfi
     made = create_store(tmp_path / "store")
     (log,) = (Path(__file__).parents[2] / "data" / "fixtures" / "v6").glob("*.rcg.gz")
     made.add(dataclasses.replace(read_match(log), log=None, rcl_path=None))
-    with pytest.raises(DatasetError, match="no match has any"):
+    with pytest.raises(DatasetError, match="no match has logged commands of HELIOS_base"):
         build_dataset(dataclasses.replace(config, source=Sources.LOGGED), store=made, out=tmp_path / "ds", jobs=1)
     assert not (tmp_path / "ds").exists()
 

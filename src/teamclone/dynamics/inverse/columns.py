@@ -34,11 +34,15 @@ def recovered_commands(
     """
     rules = Rules.of(params, types)
     try:
-        found = recover(frames, players, rules)
+        with np.errstate(all="ignore"):  # an odd log may make numbers that are none; they are then not known
+            found = recover(frames, players, rules)
     except IndexError:
         listed = len(next(iter(types.values()), ()))
         raise UsageError(f"expected players of the {listed} types that the log lists, got one of another") from None
-    return _columns(found, frames), found.gaps
+    gaps = found.gaps
+    if len(frames["cycle"]) and not len(found) and not gaps:
+        gaps = ("any command: no counter rises from one cycle to the next",)
+    return _columns(found, frames), gaps
 
 
 def _columns(found: Recovered, frames: Columns) -> Columns:

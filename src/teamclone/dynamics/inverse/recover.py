@@ -44,9 +44,12 @@ def recover(frames: Columns, players: Columns, rules: Rules) -> Recovered:
         IndexError: a player has a type that the rules do not list.
     """
     observed = observe(frames, players, rules)
-    kind = _kinds(frames, players)
-    dashed = rose(players, CommandKind.DASH) & follows(frames)[:, None]
-    necks = rose(players, CommandKind.TURN_NECK) & follows(frames)[:, None]
+    goes_on = follows(frames)
+    # What is done in the pause after a half that ends while the clock stands is counted in the next frame, too.
+    goes_on[:-1] &= ~(rules.ends_half(frames["cycle"][:-1]) & (np.diff(frames["cycle"]) > 0))
+    kind = np.where(goes_on[:, None], _kinds(frames, players), 0).astype(np.uint8)
+    dashed = rose(players, CommandKind.DASH) & goes_on[:, None]
+    necks = rose(players, CommandKind.TURN_NECK) & goes_on[:, None]
     beside = dashed & (kind != CommandKind.DASH) & rules.legs
     parts = [
         _dashes(observed, np.nonzero((kind == CommandKind.DASH) | beside)),
@@ -85,6 +88,8 @@ def _kinds(frames: Columns, players: Columns) -> NDArray[np.uint8]:
 
 def _gaps(players: Columns, rules: Rules) -> tuple[str, ...]:
     """Return what the log cannot give, a line each."""
+    if not len(players["state"]):
+        return ()
 
     def lacks(name: str) -> bool:
         values = players[name]

@@ -64,6 +64,42 @@ def test_what_is_not_known_is_no_number() -> None:
             np.testing.assert_array_equal(np.isnan(found[f"{end}{index}"]), unknown)
 
 
+def test_nothing_is_recovered_from_across_a_pause() -> None:
+    """A half may end while the clock stands: what is done in the pause is counted in the next frame."""
+    (pair,) = find_matches([FIXTURES / "v6"])
+    match = read_pair(pair)
+    game = match.game
+    end = 100
+    minutes = {"half_time": game.frames["cycle"][end] * 0.1, "extra_half_time": 0.0, "simulator_step": 100.0}
+    arguments = (game.frames, game.players)
+    whole, _ = recovered_commands(*arguments, types=game.player_types, params=game.server_params)
+    cut, _ = recovered_commands(*arguments, types=game.player_types, params=game.server_params | minutes)
+    assert (whole["frame"] == end).any()
+    assert not (cut["frame"] == end).any()
+    assert set(whole["frame"]) - {end} >= set(cut["frame"]) >= {end - 1, end + 1}
+
+
+def test_a_log_in_which_nothing_follows_says_so() -> None:
+    (pair,) = find_matches([FIXTURES / "v6"])
+    game = read_pair(pair).game
+    frames, players = ({name: values[::3] for name, values in part.items()} for part in (game.frames, game.players))
+    found, gaps = recovered_commands(frames, players, types=game.player_types, params=game.server_params)
+    assert len(found["frame"]) == 0
+    assert gaps == ("any command: no counter rises from one cycle to the next",)
+    none = {name: values[:0] for name, values in game.frames.items()}
+    nobody = {name: values[:0] for name, values in game.players.items()}
+    assert recovered_commands(none, nobody, types=game.player_types, params=game.server_params)[1] == ()
+
+
+@pytest.mark.parametrize(("name", "value"), [("dash_angle_step", 1e-6), ("player_rand", 5.0), ("ball_rand", 1.0)])
+def test_rules_that_no_match_has_are_refused(name: str, value: float) -> None:
+    (pair,) = find_matches([FIXTURES / "v6"])
+    game = read_pair(pair).game
+    params = game.server_params | {name: value}
+    with pytest.raises(UsageError, match=f"expected (a )?{name}"):
+        recovered_commands(game.frames, game.players, types=game.player_types, params=params)
+
+
 def test_types_that_the_log_does_not_list_are_told() -> None:
     (pair,) = find_matches([FIXTURES / "v6"])
     game = read_pair(pair).game

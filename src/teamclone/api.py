@@ -11,6 +11,7 @@ from teamclone.evaluation.prediction_table import MatchColumns, PredictionTable,
 from teamclone.logs import Match, read_match
 from teamclone.logs.columns import Source
 from teamclone.rcss.player_types import FIELDS
+from teamclone.store.postgres.location import masked
 from teamclone.training.run import Run, open_run
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def _columns(match: Match | Path | str, store: Store | None) -> MatchColumns:
         raise UsageError("expected the id of a match of the store, got a match; leave out the store")
     row = next((row for row in store.matches().to_pylist() if row["match_id"] == match), None)
     if row is None:
-        raise StoreError(f"{store.location}: no match {match}; see `teamclone matches`")
+        raise StoreError(f"{masked(store.location)}: no match {match}; see `teamclone matches`")
     tables = {name: store.read_match_columns(str(match), name) for name in ("frames", "player_states", "commands")}
     return MatchColumns(
         match_id=str(match),

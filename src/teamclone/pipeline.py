@@ -20,6 +20,7 @@ from teamclone.play.schedule import Schedule, folder_of, read_schedule, schedule
 from teamclone.play.server import find_server
 from teamclone.report.page import fresh_evaluation, make_report
 from teamclone.store import create_store
+from teamclone.store.postgres.location import masked
 from teamclone.system.settings import from_table
 from teamclone.training.config import Config, differences, load_config
 from teamclone.training.loop import Progress, train
@@ -185,7 +186,7 @@ def run_pipeline(
         on_record=watch.on_record,
     )
     complete = len(report.records) - len(report.failed)
-    text = f"{complete} matches in {store.location}, {len(report.failed)} failed"
+    text = f"{complete} matches in {masked(store.location)}, {len(report.failed)} failed"
     report_stage(Stage.PLAY, text, done=report.played > 0)
     if not complete:
         raise PlayError(f"{out}: no match of the schedule is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]

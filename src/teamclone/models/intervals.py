@@ -106,5 +106,5 @@ def _overlap(away: Tensor, one: Tensor, other: float) -> Tensor:
 def _ends(span: Tensor) -> tuple[Tensor, Tensor]:
     """Return the first end and the width (batch,) of intervals; of an unknown number some finite ones."""
     first, last = torch.nan_to_num(span, posinf=90.0, neginf=-90.0).unbind(1)
-    # Not their difference, which has few digits where they are close.
+    # The width apart, since the difference of two ends that are close has few digits.
     return first - LEAST_WIDTH / 2, (last - first).clamp(min=0.0) + LEAST_WIDTH

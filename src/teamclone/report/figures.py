@@ -234,7 +234,8 @@ def opponents(rows: Sequence[Mapping[str, Any]]) -> Figure:
     colours = [SECOND if row["split"] == "unseen" else ACCENT for row in rows]
     axes.errorbar(points, place, xerr=bars, fmt="none", ecolor=MUTED, elinewidth=1.2)
     axes.scatter(points, place, c=colours, s=32, zorder=3)
-    axes.set_yticks(place, [f"{row['opponent']}  ·  {row['split']}, {row['matches']}" for row in rows])
+    names = [f"{row['opponent']}  ·  {row['split']}, {row['matches']}" for row in rows]
+    axes.set_yticks(place, names, parse_math=False)  # a name may have dollars
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1, symbol=PERCENT))
     axes.set_xlabel("accuracy; the number beside the split counts matches")

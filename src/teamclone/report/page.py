@@ -196,6 +196,8 @@ def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
     for key, value in options.items():
         if key == "team" or value is None or value is False or value == []:
             continue
+        if not key.isidentifier():  # no option, and not to be copied into a shell
+            continue
         name = {"test_matches": "test-match", "validation_matches": "validation-match"}.get(key, key.replace("_", "-"))
         if value is True:
             build.append(f"--{name}")
@@ -209,7 +211,7 @@ def commands(evaluation: Mapping[str, Any], *, trained_on: Path) -> list[str]:
         "teamclone ingest MATCHES --store STORE",
         _wrapped([*build, f"--out {shlex.quote(data['path'])}"]),
         f"teamclone {learn} --out {path}  # with the settings below",
-        f"teamclone evaluate {path}{other} --checkpoint {run['checkpoint']}",
+        f"teamclone evaluate {path}{other} --checkpoint {shlex.quote(run['checkpoint'])}",
         f"teamclone bench {path}",
         f"teamclone report {path}",
     ]

@@ -10,6 +10,7 @@ from typing import Self
 from teamclone.errors import StoreError
 from teamclone.store.opening import open_store
 from teamclone.store.parquet import MARKER
+from teamclone.store.postgres.location import masked
 from teamclone.store.status import stamp
 from teamclone.store.store import Store
 
@@ -38,8 +39,8 @@ class SharedStore:
         """
         if _marker(self.location) != self.marker:
             raise StoreError(
-                f"{self.location}: the worker on {platform.node()} does not see this store; put it on a file system "
-                "that all machines have under the same path"
+                f"{masked(self.location)}: the worker on {platform.node()} does not see this store; put it on a file "
+                "system that all machines have under the same path"
             )
         return open_store(self.location)
 

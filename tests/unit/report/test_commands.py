@@ -31,3 +31,16 @@ def test_flags_stand_without_a_value_and_only_where_they_are_set(goalkeepers: bo
     expected = ["teamclone", "dataset", "--store", "STORE", "--team", "A B", "--unseen", "C", "--split", "match"]
     expected += ["--train-goalkeepers"] if goalkeepers else []
     assert words == [*expected, "--test-match", "20261122110359", "--test", "0.15", "--out", "DS"]
+
+
+def test_what_is_no_option_is_not_to_be_copied() -> None:
+    """A run may be somebody else's: its names reach no shell unquoted."""
+    evil = "x; rm -rf $HOME"
+    evaluation = {
+        "dataset": {"options": {"team": "A", evil: "1", f"{evil} #": True, "seed": evil}, "teams": [evil], "own": True}
+        | {"path": evil},
+        "run": {"base": None, "path": evil, "checkpoint": evil},
+    }
+    for line in commands(evaluation, trained_on=Path(evil)):
+        words = shlex.split(line.replace("\\\n", " "), comments=True)
+        assert "rm" not in words

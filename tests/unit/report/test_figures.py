@@ -134,3 +134,12 @@ def test_dots_of_many_positions_stay_small() -> None:
     spots = np.random.default_rng(0).uniform((-52, -34), (52, 34), (2500, 2)).round(1).tolist()
     text = figures.svg(figures.positions(dict.fromkeys(figures.KINDS, spots), {}), name="a", alt="")
     assert len(text) < 600_000
+
+
+@pytest.mark.parametrize("name", ["$\\frac{$", "A$b$C", "$", "$$"])
+def test_names_are_no_formulas(name: str) -> None:
+    rows = [
+        {"opponent": one, "split": "test", "matches": 1, "accuracy": {"value": 0.9, "low": None, "high": None}}
+        for one in (name, "Blue")
+    ]
+    assert name in figures.svg(figures.opponents(rows), name="opponents", alt="").replace("&amp;", "&")

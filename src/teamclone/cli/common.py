@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TextIO, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -19,15 +20,29 @@ from teamclone.system.settings import assignment
 E = TypeVar("E", bound=StrEnum)
 
 
+_CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Characters that a terminal obeys instead of showing them, and those that turn the direction of writing."""
+
+
+def visible(text: str) -> str:
+    """Return a text with control characters as JSON writes them, since names in logs and of files are anybody's."""
+    return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def say(text: str = "", *, file: TextIO | None = None) -> None:
+    """Print a text that may hold words of others, on stdout unless ``file`` is given."""
+    print(visible(text), file=file)
+
+
 def fail(text: str, *, code: int) -> NoReturn:
     """Print one line on stderr and exit."""
-    print(f"teamclone: {' '.join(text.splitlines())}", file=sys.stderr)
+    say(f"teamclone: {' '.join(text.splitlines())}", file=sys.stderr)
     raise SystemExit(code)
 
 
 def print_json(value: Any) -> None:
     """Print one JSON document on stdout; NaN becomes null, so that every reader takes it."""
-    print(json.dumps(_finite(value), ensure_ascii=False, indent=2, default=str))
+    say(json.dumps(_finite(value), ensure_ascii=False, indent=2, default=str))
 
 
 def _finite(value: Any) -> Any:
@@ -45,11 +60,18 @@ def print_table(
 ) -> None:
     """Print a table on stdout; ``numeric`` names the columns to align right."""
     right = set(numeric)
-    table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="bold")
+    table = Table(
+        title=None if title is None else visible(title),
+        title_justify="left",
+        title_style="bold",
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+    )
     for index, header in enumerate(headers):
         table.add_column(header, justify="right" if index in right else "left", overflow="fold")
     for row in rows:
-        table.add_row(*(str(cell) for cell in row))
+        table.add_row(*(visible(str(cell)) for cell in row))
     # Piped output is read by programs and long lines are theirs to break.
     Console(width=None if sys.stdout.isatty() else 200, highlight=False, markup=False).print(table)
 

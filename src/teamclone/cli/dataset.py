@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from teamclone.cli.common import choice, print_json, print_table, progress
+from teamclone.cli.common import choice, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from teamclone.dataset.build import DatasetConfig
@@ -144,7 +144,7 @@ def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
         print(f"{report['recovered']:,} rows are recovered: they are what game logs imply.")
     if without := report["matches_without_commands"]:
         names = ", ".join(without[:3]) + (", ..." if len(without) > 3 else "")
-        print(f"{len(without)} match(es) have no commands to take and are in no split: {names}.")
+        say(f"{len(without)} match(es) have no commands to take and are in no split: {names}.")
     if report["matches_without_team"]:
-        print(f"{report['matches_without_team']} match(es) of the store are without {report['team']}.")
-    print(f"Wrote {out}")
+        say(f"{report['matches_without_team']} match(es) of the store are without {report['team']}.")
+    say(f"Wrote {out}")

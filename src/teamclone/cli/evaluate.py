@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from teamclone.cli.common import print_json, print_table, progress
+from teamclone.cli.common import print_json, print_table, progress, say
 
 
 def evaluate(
@@ -37,13 +37,13 @@ def evaluate(
         print_json(result)
         return
     print_summary(result)
-    print(f"Wrote {path}")
+    say(f"Wrote {path}")
 
 
 def print_summary(evaluation: dict[str, Any]) -> None:
     """Print the figures of an evaluation that fit on a screen."""
     splits = evaluation["splits"]
-    print(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
+    say(f"{evaluation['dataset']['team']}, checkpoint {evaluation['run']['checkpoint']}")
     seen = evaluation["dataset"]["trained_on_before"]
     if seen:
         print(f"Caution: {len(seen)} of these matches were in training.")

@@ -19,6 +19,7 @@ def info(
     """Show the contents of match logs: teams, score, versions, cycles, commands, and anything odd."""
     import sys
 
+    from teamclone.cli.common import say
     from teamclone.errors import LogError
     from teamclone.logs import find_matches, read_pair
 
@@ -28,11 +29,11 @@ def info(
             match = read_pair(pair)
         except LogError as error:
             # The other files are still worth reading.
-            print(f"teamclone: {error}", file=sys.stderr)
+            say(f"teamclone: {error}", file=sys.stderr)
             failed = True
             continue
         found = summary(match)
-        print(json.dumps(found, ensure_ascii=False) if as_json else as_text(found))
+        say(json.dumps(found, ensure_ascii=False) if as_json else as_text(found))
     if failed:
         raise typer.Exit(1)
 

@@ -24,7 +24,7 @@ def pipeline(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result of each stage and match as JSON.")] = False,
 ) -> None:
     """Play, store, make the dataset, train, evaluate and report. Finished parts are kept."""
-    from teamclone.cli.common import print_json, print_table, progress
+    from teamclone.cli.common import print_json, print_table, progress, say, visible
     from teamclone.cli.play import line_of
     from teamclone.cli.train import reporter
     from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
@@ -46,7 +46,7 @@ def pipeline(
                 on_progress=show,
                 on_training=reporter(bar, task),
                 on_record=lambda record: bar.console.print(
-                    line_of(record), markup=False, highlight=False, soft_wrap=True
+                    visible(line_of(record)), markup=False, highlight=False, soft_wrap=True
                 ),
             ),
         )
@@ -66,7 +66,7 @@ def pipeline(
             numeric=(2,),
         )
         for record in report.failed:
-            print(line_of(record))
+            say(line_of(record))
     if report.failed:
         raise typer.Exit(1)
 

@@ -45,7 +45,7 @@ def play(
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> None:
     """Play matches on rcssserver, unattended. Given again, the command plays the missing ones."""
-    from teamclone.cli.common import print_json, progress, values_of
+    from teamclone.cli.common import print_json, progress, values_of, visible
     from teamclone.errors import UsageError
     from teamclone.play.runner import play as run
     from teamclone.play.schedule import load_schedule, quick_schedule
@@ -71,7 +71,7 @@ def play(
 
         def show(record: Record) -> None:
             count = f"{int(bar.tasks[task].completed) + 1} of {len(asked.fixtures)}"
-            bar.console.print(f"{count}: {line_of(record)}", markup=False, highlight=False, soft_wrap=True)
+            bar.console.print(f"{count}: {visible(line_of(record))}", markup=False, highlight=False, soft_wrap=True)
 
         report = run(
             asked,
@@ -101,7 +101,7 @@ def line_of(record: Record) -> str:
 
 def print_report(report: PlayReport) -> None:
     """Print pairings with the outcomes of their matches, then the failed ones."""
-    from teamclone.cli.common import print_table
+    from teamclone.cli.common import print_table, say
 
     pairings: dict[tuple[str, str], list[Record]] = {}
     for record in report.records:
@@ -125,7 +125,7 @@ def print_report(report: PlayReport) -> None:
     print_table(heads, rows, numeric=range(1, 9))
     failed = report.failed
     for record in failed[:SHOWN]:
-        print(line_of(record))
+        say(line_of(record))
     if len(failed) > SHOWN:
         print(f"and {len(failed) - SHOWN} more that failed")
     rate = f", {3600 * report.played / report.seconds:.0f} an hour" if report.played else ""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from teamclone.cli.common import fail, print_json, print_table, progress
+from teamclone.cli.common import fail, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from teamclone.rollouts.run import MatchRollouts
@@ -86,7 +86,7 @@ def rollout(
     elif document["ahead"]:
         print_table(*_table(document["ahead"], ball=ball != "logged"), numeric=range(1, 50))
         print(_realism(document["realism"]))
-        print(f"Wrote {out}")
+        say(f"Wrote {out}")
     failed = [match for match in found if match.error is not None]
     if failed:
         fail("; ".join(str(match.error) for match in failed), code=1)

@@ -84,9 +84,11 @@ def print_csv(rows: QueryRows) -> None:
 
 def print_objects(rows: QueryRows) -> None:
     """Print a JSON list, an object a line, written as the rows come."""
+    from teamclone.cli.common import visible
+
     names, before = rows.schema.names, "["
     for row in values(rows):
-        print(before + json.dumps(dict(zip(names, row, strict=True)), ensure_ascii=False), end="")
+        print(before + visible(json.dumps(dict(zip(names, row, strict=True)), ensure_ascii=False)), end="")
         before = ",\n "
     print("[]" if before == "[" else "]")
 

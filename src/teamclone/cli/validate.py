@@ -26,7 +26,7 @@ def validate(
     import json
     from itertools import chain
 
-    from teamclone.cli.common import progress
+    from teamclone.cli.common import progress, say
     from teamclone.errors import UsageError
     from teamclone.store import is_store, open_store
     from teamclone.store.validate import validate_logs, validate_store
@@ -51,7 +51,7 @@ def validate(
                 for place in stores
             ),
         ):
-            print(json.dumps(as_object(checked), ensure_ascii=False) if as_json else line(checked))
+            say(json.dumps(as_object(checked), ensure_ascii=False) if as_json else line(checked))
             total += 1
             wrong += bool(checked.wrong)
     if not as_json:

@@ -142,6 +142,11 @@ def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
     print(f"{report['turn_zero']:,} rows are (turn 0).")
     if report["recovered"]:
         print(f"{report['recovered']:,} rows are recovered: they are what game logs imply.")
+    for match in report["matches"]:
+        if match["left_out"]:
+            say(f"{match['name']} is left out: {match['left_out']}.")
+        elif match["odd_frames"]:
+            say(f"{match['name']}: {match['odd_frames']} frames with missing or impossible numbers are left out.")
     if without := report["matches_without_commands"]:
         names = ", ".join(without[:3]) + (", ..." if len(without) > 3 else "")
         say(f"{len(without)} match(es) have no commands to take and are in no split: {names}.")

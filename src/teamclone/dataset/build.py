@@ -19,6 +19,7 @@ from teamclone.dataset.clean import Commands, MatchSamples, TurnZero
 from teamclone.dataset.split import MatchKey, split_matches, split_rows
 from teamclone.dataset.write import DatasetWriter, writing_dataset
 from teamclone.dynamics.inverse.columns import recovered_commands
+from teamclone.dynamics.rules import check_parameters
 from teamclone.errors import DatasetError, UsageError, choose
 from teamclone.logs.columns import COMMANDS, INTERVALS, Source, counter_name
 from teamclone.logs.match import empty_columns
@@ -203,6 +204,7 @@ def build_dataset(
             row = _report_match(
                 task.entry, match, source=_source_of(task.entry, config), split=name, repertoire=config.repertoire
             )
+            row["left_out"] = of_match.left_out
             matches.append(row if len(config.teams) == 1 else {"team": task.entry.team, **row})
             parameters.append(of_match)
             if on_progress is not None:
@@ -303,8 +305,12 @@ def _options(config: DatasetConfig) -> dict[str, Any]:
 
 
 class _Parameters(NamedTuple):
-    """Parameters of one match: ``types`` (n_types, n_fields) of its players, ``server`` (n_fields,)."""
+    """Parameters of one match: ``types`` (n_types, n_fields) of its players, ``server`` (n_fields,).
 
+    ``left_out`` is why they are none that a match can have, None where they are.
+    """
+
+    left_out: str | None
     types: NDArray[np.float32]
     server: NDArray[np.float64]
 
@@ -316,7 +322,14 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
     frames = store.read_match_columns(match_id, "frames", columns=FRAME_COLUMNS)
     players = store.read_match_columns(match_id, "player_states", columns=PLAYER_COLUMNS)
-    if task.recover:
+    left_out = None
+    try:
+        check_parameters(params, types)
+    except UsageError as error:  # what no match has would spoil the samples of all others
+        left_out = str(error)
+    if left_out is not None:
+        commands = empty_columns((*COMMANDS, *INTERVALS), 0)
+    elif task.recover:
         players |= store.read_match_columns(match_id, "player_states", columns=[counter_name(CommandKind.TURN_NECK)])
         try:
             commands, _ = recovered_commands(frames, players, types=types, params=params)
@@ -337,6 +350,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
         repertoire=task.repertoire,
     )
     return samples, _Parameters(
+        left_out=left_out,
         types=np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32),
         server=server_params.vector(params, version=server_params.OLDEST),
     )
@@ -473,6 +487,7 @@ def _report_match(
         "player_cycles": match.player_cycles,
         "idle": match.idle,
         "frozen": match.frozen,
+        "odd_frames": match.odd_frames,
         "rules": [asdict(rule) for rule in match.rules],
     }
 
@@ -501,7 +516,7 @@ def _report(
         "rows": {split.name.lower(): _by_kind(rows[split], config.repertoire) for split in layout.Split},
         **{
             name: sum(match[name] for match in matches)
-            for name in ("executed", "turn_zero", "player_cycles", "idle", "frozen")
+            for name in ("executed", "turn_zero", "player_cycles", "idle", "frozen", "odd_frames")
         },
         "matches": list(matches),
     }

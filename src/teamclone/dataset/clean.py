@@ -35,6 +35,10 @@ With those of `columns.INTERVALS` the samples know how well their arguments are 
 """
 
 
+_FARTHEST = 1e6
+"""No place, velocity, angle or stamina is greater."""
+
+
 class Commands(StrEnum):
     """Which commands become samples."""
 
@@ -72,6 +76,7 @@ class MatchSamples:
         player_cycles: cycles x players of the team on the field, of those players and in those play modes that the
             samples are of; field players in play_on by default.
         idle: those of them without any body command, and ``frozen`` those among them after a tackle or foul.
+        odd_frames: frames in play that were left out, see `whole_frames`.
     """
 
     frames: Columns
@@ -81,6 +86,7 @@ class MatchSamples:
     player_cycles: int
     idle: int
     frozen: int
+    odd_frames: int
 
 
 def clean_match(
@@ -108,7 +114,9 @@ def clean_match(
             command is a sample.
     """
     everyone = "catch" in repertoire
-    in_play = frames_in_play(frames, repertoire)
+    in_play, whole = frames_in_play(frames, repertoire), whole_frames(frames, players)
+    odd_frames = int((in_play & ~whole).sum())
+    in_play &= whole
     where = "in play_on or around a set play" if "move" in repertoire else "in play_on"
     goalie = (players["state"] & state_bits.GOALIE) != 0
     slots = slot_of(commands["side"], commands["unum"])
@@ -130,7 +138,7 @@ def clean_match(
 
     own = slice(0, N_TEAM) if side > 0 else slice(N_TEAM, N_PLAYERS)
     state = players["state"][:-1, own]
-    due = players_to_model(frames, players, side=side, repertoire=repertoire)[:-1]
+    due = (players_to_model(frames, players, side=side, repertoire=repertoire) & whole[:, None])[:-1]
     idle = due & ~has_command[:-1, own]
     frozen = idle & ((state & (state_bits.TACKLES | state_bits.FOUL_CHARGED)) != 0)
 
@@ -161,7 +169,28 @@ def clean_match(
         player_cycles=int(due.sum()),
         idle=int(idle.sum()),
         frozen=int(frozen.sum()),
+        odd_frames=odd_frames,
     )
+
+
+def whole_frames(frames: Columns, players: Columns) -> NDArray[np.bool_]:
+    """Return (n_frames,) whether ball and players on the field have all their numbers, as numbers that can be.
+
+    A number that no frame of the log has, such as velocities in old versions, is not missed.
+    """
+    on_field = (players["state"] & state_bits.STAND) != 0
+    odd = np.zeros(len(frames["cycle"]), np.bool_)
+    names = ("x", "y", *(channel.name for channel in channels.MEASURED))
+    for values, there in (
+        *((frames[f"ball_{name}"], None) for name in ("x", "y", "vx", "vy")),
+        *((players[name], on_field) for name in names),
+    ):
+        lacking = np.isnan(values)
+        wrong = np.abs(values) > _FARTHEST
+        if not lacking.all():
+            wrong |= lacking
+        odd |= wrong if there is None else (wrong & there).any(axis=1)
+    return ~odd
 
 
 def frames_in_play(frames: Columns, repertoire: tuple[str, ...]) -> NDArray[np.bool_]:

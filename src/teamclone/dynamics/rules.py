@@ -54,12 +54,7 @@ class Rules:
                 can be played by, such as a decay of 1.
         """
         version = server_of.version(params) if version is None else version
-        for name in (*server_of.DEFAULTS, *server_of.FURTHER):
-            if not isinstance(params.get(name, 0.0), int | float):
-                raise UsageError(f"expected {name} to be a number, got {params[name]!r}")
-        server = {
-            name: server_of.number(params, name, version=version) for name in (*server_of.DEFAULTS, *server_of.FURTHER)
-        }
+        server = _server(params, version=version)
         for name in ("wind_rand", "team_actuator_noise"):
             if server[name] != 0:
                 raise UsageError(f"expected a match without wind and noise by team, got {name} = {server[name]:g}")
@@ -94,6 +89,25 @@ class Rules:
     def legs(self) -> bool:
         """Whether players dash with two legs, each with a power and a direction of its own."""
         return self.version >= LEGS_SINCE
+
+
+def check_parameters(params: Mapping[str, float | str], types: Mapping[str, NDArray[Any]]) -> None:
+    """Raise unless a match can be played by these parameters; arguments as of `Rules.of`.
+
+    Raises:
+        UsageError: it cannot: a decay of 1, a power of 1e308, a text in place of a number.
+    """
+    server = _server(params, version=server_of.version(params))
+    _check(server, {name: np.asarray(types[name], np.float64) for name in player_types.FIELDS})
+
+
+def _server(params: Mapping[str, float | str], *, version: int) -> dict[str, float]:
+    """Return the parameters of the server that enter computations."""
+    names = (*server_of.DEFAULTS, *server_of.FURTHER)
+    for name in names:
+        if not isinstance(params.get(name, 0.0), int | float):
+            raise UsageError(f"expected {name} to be a number, got {params[name]!r}")
+    return {name: server_of.number(params, name, version=version) for name in names}
 
 
 _MOST = 1e7

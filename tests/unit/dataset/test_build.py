@@ -24,7 +24,7 @@ import pytest
 import torch
 
 from disk import small_disk
-from teamclone.dataset import build
+from teamclone.dataset import build, layout
 from teamclone.dataset.build import DatasetConfig, Sources, SplitBy, build_dataset, is_current
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
@@ -352,6 +352,46 @@ def test_a_game_log_that_implies_nothing_costs_no_other(
     config = dataclasses.replace(config, source=Sources.RECOVERED)
     report = build_dataset(config, store=mixed, out=tmp_path / "ds", jobs=1)
     assert [sum(match["rows"].values()) > 0 for match in report["matches"]] == [False, True] * 3
+
+
+@pytest.mark.parametrize(("name", "value"), [("x", np.nan), ("y", np.inf), ("stamina", np.nan), ("vx", -np.inf)])
+def test_frames_with_impossible_numbers_are_left_out(
+    tmp_path: Path, fixtures_dir: Path, name: str, value: float
+) -> None:
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match, made = read_match(log), create_store(tmp_path / "store")
+    values = match.players[name].copy()
+    values[100:110, 15] = value
+    game = dataclasses.replace(match.game, players=match.players | {name: values})
+    made.add(dataclasses.replace(match, match_id="0" * 16, game=game))
+    made.add(match)
+    config = DatasetConfig(teams=(TEAM,), test=0, validation=0)
+    report = build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    odd, sound = report["matches"]
+    assert 0 < odd["odd_frames"] <= 10
+    assert sound["odd_frames"] == 0
+    assert sum(odd["rows"].values()) == sum(sound["rows"].values()) - 10 * odd["odd_frames"]
+    dataset = open_dataset(tmp_path / "ds")
+    assert torch.isfinite(dataset.frames["position"]).all()
+    assert (dataset.frames["measured"] != layout.MISSING).all()
+
+
+@pytest.mark.parametrize(("name", "value"), [("max_dash_power", 1e308), ("ball_decay", 1.0), ("ball_size", -1.0)])
+def test_a_match_by_impossible_rules_is_left_out_and_named(
+    tmp_path: Path, fixtures_dir: Path, name: str, value: float
+) -> None:
+    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
+    match, made = read_match(log), create_store(tmp_path / "store")
+    game = dataclasses.replace(match.game, server_params=match.game.server_params | {name: value})
+    made.add(dataclasses.replace(match, match_id="0" * 16, game=game))
+    made.add(match)
+    config = DatasetConfig(teams=(TEAM,), test=0, validation=0)
+    report = build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
+    odd, sound = report["matches"]
+    assert f"expected {name} to be" in odd["left_out"]
+    assert sum(odd["rows"].values()) == 0
+    assert sound["left_out"] is None
+    assert torch.isfinite(open_dataset(tmp_path / "ds").target(np.arange(10)).parameters).all()
 
 
 def test_a_command_log_that_comes_later_makes_a_dataset_old(

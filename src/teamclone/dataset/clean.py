@@ -142,18 +142,7 @@ def clean_match(
     idle = due & ~has_command[:-1, own]
     frozen = idle & ((state & (state_bits.TACKLES | state_bits.FOUL_CHARGED)) != 0)
 
-    kind_index = np.zeros(max(CommandKind) + 1, np.uint8)
-    kind_index[kinds] = np.arange(len(kinds))
-    arguments = used_arguments({name: chain.column(name) for name in COMMAND_COLUMNS}, server_params)
-    samples: Columns = {
-        "frame": chain.column("frame").astype(np.int64),
-        "player": (chain.column("unum") - 1).astype(np.uint8),
-        "kind": kind_index[chain.column("kind")],
-        "parameters": np.nan_to_num(arguments),
-        "interval": _intervals(chain, arguments),
-        "executed": executed,
-        "turn_zero": is_turn_zero,
-    }
+    samples = _samples(chain, kinds, server_params) | {"executed": executed, "turn_zero": is_turn_zero}
     if "none" in repertoire and len(commands["kind"]):
         nothing = idle & _nothing(frames, players)[:-1, own]
         samples = _with_none(samples, nothing, kind=repertoire.index("none"))
@@ -269,6 +258,20 @@ def _bind(
             every if of_field is None else of_field[chain.column("frame"), slots[chain.rows]], "of field players"
         )
     chain.keep(np.isin(chain.rows, first_body_commands(chain.commands, frames["playmode"])), "first of the cycle")
+
+
+def _samples(chain: _Chain, kinds: list[CommandKind], server_params: Mapping[str, float | str]) -> Columns:
+    """Return layout.SAMPLE_ARRAYS of the commands that are left, but for ``executed``, ``turn_zero`` and ``split``."""
+    kind_index = np.zeros(max(CommandKind) + 1, np.uint8)
+    kind_index[kinds] = np.arange(len(kinds))
+    arguments = used_arguments({name: chain.column(name) for name in COMMAND_COLUMNS}, server_params)
+    return {
+        "frame": chain.column("frame").astype(np.int64),
+        "player": (chain.column("unum") - 1).astype(np.uint8),
+        "kind": kind_index[chain.column("kind")],
+        "parameters": np.nan_to_num(arguments),
+        "interval": _intervals(chain, arguments),
+    }
 
 
 def _intervals(chain: _Chain, arguments: NDArray[np.float32]) -> NDArray[np.float16]:

@@ -211,15 +211,15 @@ def _missing_frames(frames: Columns, rules: Rules) -> Iterator[Deviation]:
 def _substitutions(match: Logged) -> Iterator[Deviation]:
     """Yield the one deviation of a log in which players change types in play_on, which the server refuses coaches."""
     at = np.flatnonzero(plays_on(match.frames) & ~match.trainer)
-    before, after = match.bodies.select(at), match.bodies.select(at + 1)
-    changed = before.on_field & after.on_field & (before.type != after.type)
+    kind, there = match.bodies.type, match.bodies.on_field
+    changed = there[at] & there[at + 1] & (kind[at] != kind[at + 1])
     if changed.any():
         row, player = (int(place) for place in np.argwhere(changed)[0])
         yield Deviation(
             law=SUBSTITUTIONS,
             rows=int(changed.sum()),
             cycle=int(match.frames["cycle"][at[row] + 1]),
-            what=f"{_name(player)} {SUBSTITUTIONS.off.format(after.type[row, player])} {before.type[row, player]}; "
+            what=f"{_name(player)} {SUBSTITUTIONS.off.format(kind[at[row] + 1, player])} {kind[at[row], player]}; "
             "likely this value was changed after the match; what it did in this cycle is not compared",
         )
 

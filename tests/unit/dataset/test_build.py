@@ -29,7 +29,7 @@ from teamclone.dataset.build import DatasetConfig, Sources, SplitBy, build_datas
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.errors import ClusterError, DatasetError, StoreError, UsageError
-from teamclone.logs import read_match
+from teamclone.logs import Match, read_match
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.store import Store, create_store, open_store
 from teamclone.world.channels import CHANNEL, FLAG_GOALIE
@@ -329,13 +329,19 @@ def test_sources_of_commands(mixed: Store, tmp_path: Path, source: Sources, sour
     assert 0 < float(width.median()) < 1
 
 
-def test_a_match_of_two_teams_of_which_one_did_nothing(tmp_path: Path, fixtures_dir: Path) -> None:
+def one_sided(fixtures_dir: Path, folder: Path) -> tuple[Match, Store]:
+    """A match whose command log has the left team alone, and a store with it."""
     (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
     match = read_match(log)
     assert match.log is not None
     ours = {name: values[match.commands["side"] >= 0] for name, values in match.log.commands.items()}
-    made = create_store(tmp_path / "store")
+    made = create_store(folder)
     made.add(dataclasses.replace(match, log=dataclasses.replace(match.log, commands=ours)))
+    return match, made
+
+
+def test_a_match_of_two_teams_of_which_one_did_nothing(tmp_path: Path, fixtures_dir: Path) -> None:
+    match, made = one_sided(fixtures_dir, tmp_path / "store")
     config = DatasetConfig(teams=(match.left.name or "", match.right.name or ""), test=0, validation=0)
     report = build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)
     assert [row["side"] for row in report["matches"]] == ["left"]
@@ -411,12 +417,7 @@ def test_a_command_log_that_comes_later_makes_a_dataset_old(
 
 
 def test_a_side_that_its_command_log_lacks_is_recovered(tmp_path: Path, fixtures_dir: Path) -> None:
-    (log,) = (fixtures_dir / "v6").glob("*.rcg.gz")
-    match = read_match(log)
-    assert match.log is not None
-    ours = {name: values[match.commands["side"] >= 0] for name, values in match.log.commands.items()}
-    made = create_store(tmp_path / "store")
-    made.add(dataclasses.replace(match, log=dataclasses.replace(match.log, commands=ours)))
+    match, made = one_sided(fixtures_dir, tmp_path / "store")
     config = DatasetConfig(teams=(match.right.name or "",), test=0, validation=0)
     with pytest.raises(DatasetError, match="no match has any"):
         build_dataset(config, store=made, out=tmp_path / "ds", jobs=1)

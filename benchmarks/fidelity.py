@@ -32,7 +32,7 @@ from typing import Any
 import fidelity_page
 import numpy as np
 import torch
-from kicks import EXACT, EXACT_DEG, as_planned, kicked, tackles_as_planned
+from kicks import EXACT, EXACT_DEG, as_planned, kicked, plans, tackles_as_planned
 from measure import cost_of
 from numpy.typing import NDArray
 
@@ -40,6 +40,8 @@ import teamclone
 from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import open_dataset
 from teamclone.dataset.write import write_dataset
+from teamclone.engine.inputs.layout import BLOCKS
+from teamclone.engine.inputs.reach import reach_ball
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation import baselines, metrics
 from teamclone.evaluation.describe import describe
@@ -47,18 +49,15 @@ from teamclone.evaluation.evaluate import count_training
 from teamclone.evaluation.predict import predict, truth
 from teamclone.evaluation.predictions import Predictions
 from teamclone.models.clone import parameter_count
-from teamclone.models.config import BLOCKS, FAMILIES, of_targets
+from teamclone.models.config import FAMILIES, of_targets
 from teamclone.models.inputs.egocentric import EgocentricFeatures
-from teamclone.models.inputs.planned import plans
-from teamclone.models.inputs.reach import kickable_area, reach_ball
-from teamclone.planner.plan import CHOICES
+from teamclone.planner.columns import CHOICES
 from teamclone.rcss.commands import CLONED, PARAMETERS
 from teamclone.system.documents import write_document
 from teamclone.system.machine import processor
 from teamclone.system.settings import assignment
 from teamclone.training.config import Config, config_from, load_config, to_table
 from teamclone.training.run import is_run, open_run
-from teamclone.world.channels import CHANNEL
 from teamclone.world.state import State
 
 FORMAT = 1
@@ -649,14 +648,12 @@ SITUATIONS = ("ball kickable", "first of the team to the ball", "off the ball")
 
 def situations(state: State) -> NDArray[np.int64]:
     """(batch,) index into SITUATIONS of the acting player; the ball is taken to roll on freely."""
-    actor = state.actor[:, None]
-    gap = (state.players[..., [CHANNEL["x"], CHANNEL["y"]]] - state.ball[:, None, :2]).norm(dim=2)
-    kickable = (gap <= kickable_area(state.types, state.server))[state.frame, state.actor]
-    free = torch.zeros(len(state.actor), dtype=torch.bool)
-    steps = reach_ball(state, held=free).steps[:, :11]
-    first = steps.gather(1, actor)[:, 0] <= steps.amin(1)
-    found: NDArray[np.int64] = torch.where(kickable, 0, torch.where(first, 1, 2)).numpy()
-    return found
+    actor = state.actor.numpy()
+    each = state.each()
+    parts = (part.numpy() for part in (each.ball, each.players, each.types, each.server))
+    steps = reach_ball(*parts, actor=actor, held=np.zeros(len(actor), np.bool_)).steps[:, :11]
+    own = steps[np.arange(len(actor)), actor]
+    return np.where(own == 0, 0, np.where(own <= steps.min(1), 1, 2))
 
 
 def agreement(probabilities: NDArray[np.floating], kind: NDArray[np.int64]) -> dict[str, float]:

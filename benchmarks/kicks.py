@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from teamclone.dynamics import formulas
-from teamclone.planner.plan import CHOICES, KICK_OF, PLAN, WAYS
+from teamclone.engine.inputs.project import Frames
+from teamclone.engine.inputs.project import plans as made_plans
+from teamclone.planner.columns import CHOICES, KICK_OF, PLAN, WAYS
 from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.world.channels import CHANNEL, TYPE_FIELD
 from teamclone.world.state import State
@@ -19,6 +21,12 @@ EXACT_DEG = 1.0
 """Degrees by which a tackle's direction may; HELIOS Base chooses among 40, nine degrees apart."""
 
 Floats = NDArray[np.floating]
+
+
+def plans(state: State) -> Tensor:
+    """Return (batch, len(PLAN)) the plans of the actors."""
+    *frames, frame, actor = (part.numpy() for part in state)
+    return torch.from_numpy(made_plans(Frames(*frames), frame, actor)).to(torch.float32)
 
 
 def kicked(state: State, arguments: Tensor) -> Tensor:

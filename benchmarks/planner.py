@@ -14,11 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from kicks import as_planned, kicked, tackles_as_planned
+from kicks import as_planned, kicked, plans, tackles_as_planned
 
 from teamclone.dataset.reader import open_dataset
-from teamclone.models.inputs.planned import plans
-from teamclone.planner.plan import CHOICES, WAYS
+from teamclone.planner.columns import CHOICES, WAYS
 from teamclone.rcss.commands import CLONED
 
 REPEATS = 3

@@ -9,15 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
+from teamclone.engine.inputs.layout import BLOCKS
 from teamclone.rcss.commands import CLONED, REPERTOIRE, not_of_repertoire
 from teamclone.rcss.player_types import GROUPS
 from teamclone.system.settings import setting, without_effect
 
-BLOCKS = (
-    "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
-    "mode",
-)  # fmt: skip
-"""Blocks of the egocentric inputs, in the order of their columns; see `inputs.egocentric.EgocentricFeatures`."""
 ATTENTION_HEADS = 4
 """Heads of attention in `layers.players.PlayerEncoder`."""
 ACTIVATIONS = ("relu", "gelu", "silu", "tanh")

@@ -29,10 +29,10 @@ from teamclone.planner.scene import (
     Y,
     direction,
     gap,
-    kernel,
     roll,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 NEVER_CYCLES = 1000
 """Cycles to where the ball, or a player, does not come."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.planner.scene import Array, kernel
+from teamclone.planner.scene import Array
+from teamclone.system.compiling import kernel
 
 VALUE = 0
 """Column of what a candidate is worth."""

@@ -35,9 +35,9 @@ from teamclone.planner.scene import (
     direction,
     gap,
     inertia_point,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 DIRECTIONS, DASHES, AHEAD = 16, (2, 4), 0.2
 """Directions of a dribble around the body, its dashes, and the part of the margin by which the ball is then ahead."""

@@ -19,9 +19,9 @@ from teamclone.planner.scene import (
     at_rest,
     direction,
     gap,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 NEAR_GOAL_M = 40.0
 CAN_SHOOT, ACTOR_SHOOTS = 1e6, 5e5

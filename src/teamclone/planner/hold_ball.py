@@ -42,9 +42,9 @@ from teamclone.planner.scene import (
     direction,
     gap,
     inertia_point,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 RING_PARTS, AROUND = (0.4, 0.6, 0.75), 20
 """Rings around the player, parts of the margin, and how many places on each, evenly, the first towards -x."""

@@ -19,10 +19,10 @@ from teamclone.planner.scene import (
     Array,
     gap,
     inertia_point,
-    kernel,
     most_turn,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 FAR_OFF_M = 1.0
 """The most that is given."""

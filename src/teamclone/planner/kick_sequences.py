@@ -43,11 +43,11 @@ from teamclone.planner.scene import (
     Y,
     direction,
     gap,
-    kernel,
     turned,
 )
 from teamclone.rcss.player_types import DEFAULTS
 from teamclone.rcss.server_params import SERVER_FIELD
+from teamclone.system.compiling import kernel
 
 Ints = NDArray[np.int64]
 

@@ -22,9 +22,9 @@ from teamclone.planner.scene import (
     STAMINA_INC,
     Array,
     inertia_point,
-    kernel,
 )
 from teamclone.rcss.server_params import SERVER_FIELD
+from teamclone.system.compiling import kernel
 
 S_STAMINA, S_EFFORT, S_RECOVERY, S_CAPACITY = range(4)
 """What dashes use up, a part of the columns of a player."""

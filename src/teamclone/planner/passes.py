@@ -49,9 +49,9 @@ from teamclone.planner.scene import (
     at_rest,
     direction,
     gap,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 DIRECT, LEADING, THROUGH = range(3)
 """Kinds of a pass."""

@@ -8,18 +8,15 @@ held otherwise. Of a player that may tackle the ball the plan says where to.
 from __future__ import annotations
 
 import math
-import zlib
 from functools import lru_cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from teamclone.planner import dribble, passes
 from teamclone.planner.ball import fastest_from, kick_rate
 from teamclone.planner.candidates import VALUE
+from teamclone.planner.columns import CHOICES, MOST_VALUE_M, PLAN, UNDERWAY
 from teamclone.planner.dribble import best_dribble
 from teamclone.planner.field_evaluator import evaluate
 from teamclone.planner.hold_ball import hold_ball, stays
@@ -47,44 +44,14 @@ from teamclone.planner.scene import (
     complete,
     direction,
     gap,
-    kernel,
-    scenes,
     turned,
 )
 from teamclone.planner.self_pass import best_self_pass
 from teamclone.planner.shoot import best_shot
 from teamclone.planner.tackle import best_tackle, can_tackle
-from teamclone.rcss import pitch, player_types, server_params
-from teamclone.system.compiling import tell_when_compiled
-from teamclone.world import channels
+from teamclone.system.compiling import kernel
 
-WAYS = ("shot", "clear", "pass", "dribble", "self_pass", "hold")
-"""Ways to kick."""
-CHOICES = (*WAYS, "prepare", "turn", "leave")
-"""What is chosen: a way; the first kick of several; no kick but a turn; to leave it to a team mate that is nearer."""
-KICK_OF = {**{name: name for name in WAYS}, "prepare": "pass"}
-"""The way of each choice that kicks."""
 _SHOT, _CLEAR, _PASS, _DRIBBLE, _SELF_PASS, _HOLD, _PREPARE, _TURN, _LEAVE = range(len(CHOICES))
-VALUED = ("pass", "dribble", "self_pass", "hold")
-"""Ways that are compared by the value of where they bring the ball."""
-UNDERWAY = "dribble_m", "dribble_dashes", "self_pass_m", "self_pass_dashes", "turn_m", "turn_dashes"
-"""See `keep_dribble.underway`."""
-PLAN = (
-    "able",
-    *(f"choose_{name}" for name in CHOICES),
-    *(f"{name}_there" for name in WAYS),
-    *(f"{name}_value" for name in VALUED),
-    "pass_kicks",
-    "pass_cycles",
-    *(f"underway_{name}" for name in UNDERWAY),
-    "tackle_there",
-    "tackle_degrees",
-    *(f"{name}_{axis}" for name in WAYS for axis in ("vx", "vy")),
-)
-"""Columns of a plan; all 0 but for a player that can kick the ball, and ``tackle_`` for one that can tackle it. Values
-are metres beyond the best of the others, at most MOST_VALUE_M; velocities those of the ball after the kick, metres per
-cycle on the pitch; degrees are from the body."""
-MOST_VALUE_M = 20.0
 _WAY = PLAN.index("shot_vx")
 """Where the velocities begin."""
 _THERE, _VALUE, _KICKS = PLAN.index("shot_there"), PLAN.index("pass_value"), PLAN.index("pass_kicks")
@@ -184,7 +151,7 @@ def _compare(values: Array, made: Array) -> int:
 
 @kernel
 def _plan_with_ball(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> None:
-    """Fill the plan of a player that can kick the ball, see `_plan`."""
+    """Fill the plan of a player that can kick the ball, see `plan_scene`."""
     me, ball = scene[ACTOR], scene[BALL]
     own_m = gap(ball[X], ball[Y], me[X], me[Y])
     contested, left = False, False
@@ -238,11 +205,11 @@ def _plan_with_ball(scene: Array, actor: int, order: NDArray[np.int64], made: Ar
 
 
 @kernel
-def _plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> None:
+def plan_scene(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> None:
     """Fill PLAN of one scene.
 
     Args:
-        scene: (ROWS, COLUMNS) see `scenes`. order: see `kick_order`. made: (len(PLAN),) zeros.
+        scene: (ROWS, COLUMNS) see `planner.scene`. order: see `kick_order`. made: (len(PLAN),) zeros.
     """
     if scene[actor, PRESENT] == 0 or not np.isfinite(scene).all():  # whatever a log may hold
         return
@@ -262,25 +229,6 @@ def _plan(scene: Array, actor: int, order: NDArray[np.int64], made: Array) -> No
         made[:] = 0.0
 
 
-def _compiled() -> Any:
-    """Return a kernel that plans on many scenes."""
-    # Numba keeps what it compiled as long as the file of this function stays the same. It depends on all of these.
-    elsewhere = (Path(str(module.__file__)) for module in (pitch, server_params, player_types, channels))
-    sources = (*sorted(Path(__file__).parent.glob("*.py")), *elsewhere)
-    version = zlib.crc32(b"".join(path.read_bytes() for path in sources))
-
-    @njit(cache=True, nogil=True, error_model="numpy")
-    def plan_all(
-        made_from: Array, actors: NDArray[np.int64], orders: NDArray[np.int64], which: NDArray[np.int64], made: Array
-    ) -> int:
-        for index in range(len(actors)):
-            _plan(made_from[index], actors[index], orders[which[index]], made[index])
-        return version
-
-    return plan_all
-
-
-_plan_all = _compiled()
 _order = lru_cache(maxsize=64)(kick_order)
 
 
@@ -290,20 +238,14 @@ def _orders(servers: tuple[tuple[float, ...], ...]) -> NDArray[np.int64]:
     return np.stack([_order(server) for server in servers])
 
 
-tell_when_compiled({_plan_all: "compiling the plans with the ball, once (half a minute)"})
-
-
-def plan(ball: Array, players: Array, types: Array, server: Array, actor: NDArray[np.int64]) -> Array:
-    """Return (n, len(PLAN)) the plans of players at the ball, or near it.
+def orders_of(server: NDArray[np.floating]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return every different `kick_order` of some servers, and (n,) which of them each has.
 
     Args:
-        ball: (n, 4) x, y, vx, vy in metres and metres per cycle. players: (n, 22, channels) as `PLAYER_CHANNELS` orders
-            them, the actor's team first. types: (n, 22, fields) as `player_types.FIELDS`.
-        server: (n, fields) as `server_params.FIELDS`. actor: (n,) 0..10.
+        server: (n, fields) as `server_params.FIELDS`.
     """
-    made = np.zeros((len(actor), len(PLAN)))
-    if len(actor):
-        servers, which = np.unique(server[:, ORDER_FIELDS].astype(np.float64), axis=0, return_inverse=True)
-        orders = _orders(tuple(map(tuple, servers.tolist())))
-        _plan_all(scenes(ball, players, types, server), actor, orders, which.reshape(-1), made)
-    return made
+    fields = server[:, ORDER_FIELDS].astype(np.float64)
+    if (fields == fields[:1]).all():  # sorting takes longer than all the rest of a single answer
+        return _orders((tuple(fields[0].tolist()),)), np.zeros(len(server), np.int64)
+    servers, which = np.unique(fields, axis=0, return_inverse=True)
+    return _orders(tuple(map(tuple, servers.tolist()))), which.reshape(-1)

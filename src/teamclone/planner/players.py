@@ -33,9 +33,9 @@ from teamclone.planner.scene import (
     direction,
     in_their_area,
     inertia_point,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 HARDLY_M = 0.001
 """Metres that count as nothing."""

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from teamclone.rcss import pitch
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.server_params import FIELDS, SERVER_FIELD
+from teamclone.system.compiling import kernel
 from teamclone.world.channels import CHANNEL, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING, TYPE_FIELD
 
 Array = NDArray[np.float64]
-
-kernel: Any = njit(nogil=True, error_model="numpy")
-"""None of these is cached: `plan.plan` keeps all of them together, since the cache does not see which calls which."""
 
 OPPONENT, BALL, ACTOR, SERVER, ROWS = N_TEAM, N_PLAYERS, N_PLAYERS + 1, N_PLAYERS + 2, N_PLAYERS + 3
 """Rows: the team, from OPPONENT on the opponents, the ball, once more the player who acts, and the server's parameters.
@@ -47,67 +43,76 @@ GAIN, OFFSIDE = BODY, STAMINA
 FAR_AWAY_M = 1e6
 
 (BALL_DECAY, BALL_SPEED_MAX, BALL_ACCEL_MAX, BALL_SIZE, BALL_RAND, PLAYER_RAND, MAX_POWER, MAX_DASH, TACKLE_DIST,
- TACKLE_WIDTH, TACKLE_EXPONENT, FOUL_EXPONENT, TACKLE_RATE, TACKLE_POWER, TACKLE_BACK_POWER) = (
+ TACKLE_WIDTH, TACKLE_EXPONENT, FOUL_EXPONENT, TACKLE_RATE, TACKLE_POWER, TACKLE_BACK_POWER, TACKLE_CYCLES,
+ CATCH_LENGTH, CATCH_WIDTH, PLAYER_ACCEL_MAX) = (
     SERVER_FIELD[name] for name in (
         "ball_decay", "ball_speed_max", "ball_accel_max", "ball_size", "ball_rand", "player_rand", "maxpower",
         "max_dash_power", "tackle_dist", "tackle_width", "tackle_exponent", "foul_exponent", "tackle_power_rate",
-        "max_tackle_power", "max_back_tackle_power"))  # fmt: skip
+        "max_tackle_power", "max_back_tackle_power", "tackle_cycles", "catchable_area_l", "catchable_area_w",
+        "player_accel_max"))  # fmt: skip
 """Columns of the server."""
 
 GOAL_X, GOAL_Y = pitch.HALF_LENGTH, pitch.GOAL_WIDTH / 2
 LINE_Y = pitch.HALF_WIDTH
 PENALTY_X, PENALTY_Y = pitch.HALF_LENGTH - pitch.PENALTY_AREA_LENGTH, pitch.PENALTY_AREA_WIDTH / 2
 
-_CHANNELS = np.array(
-    [CHANNEL[name] for name in ("x", "y", "vx", "vy", "body", "stamina", "effort", "recovery", "capacity")]
-)
+_CHANNELS = tuple(CHANNEL[name] for name in ("x", "y", "vx", "vy", "body", "stamina", "effort", "recovery", "capacity"))
+"""Channels in the order of the columns X to CAPACITY."""
+_FLAGS = CHANNEL["flags"]
 _FIELDS = (
-    (TOUCH, "player_size"),
-    (MARGIN, "kickable_margin"),
-    (DASH_RATE, "dash_power_rate"),
-    (DECAY, "player_decay"),
-    (INERTIA, "inertia_moment"),
-    (SPEED_MAX, "player_speed_max"),
-    (STAMINA_INC, "stamina_inc_max"),
-    (EXTRA, "extra_stamina"),
-    (EFFORT_MIN, "effort_min"),
-    (EFFORT_MAX, "effort_max"),
-    (KICK_RATE, "kick_power_rate"),
-    (KICK_RAND, "kick_rand"),
+    (TOUCH, TYPE_FIELD["player_size"]),
+    (MARGIN, TYPE_FIELD["kickable_margin"]),
+    (DASH_RATE, TYPE_FIELD["dash_power_rate"]),
+    (DECAY, TYPE_FIELD["player_decay"]),
+    (INERTIA, TYPE_FIELD["inertia_moment"]),
+    (SPEED_MAX, TYPE_FIELD["player_speed_max"]),
+    (STAMINA_INC, TYPE_FIELD["stamina_inc_max"]),
+    (EXTRA, TYPE_FIELD["extra_stamina"]),
+    (EFFORT_MIN, TYPE_FIELD["effort_min"]),
+    (EFFORT_MAX, TYPE_FIELD["effort_max"]),
+    (KICK_RATE, TYPE_FIELD["kick_power_rate"]),
+    (KICK_RAND, TYPE_FIELD["kick_rand"]),
 )
+"""Columns that are parameters of the player's type."""
 
 
-def scenes(ball: Array, players: Array, types: Array, server: Array) -> Array:
-    """Return (n, ROWS, COLUMNS) what of the scenes does not depend on the actor.
+@kernel
+def _fill_player(player: Array, channels: Array, of_type: Array, server: Array) -> None:
+    """Fill the row of a player, see `fill_scene`."""
+    for column in range(len(_CHANNELS)):
+        player[column] = channels[_CHANNELS[column]]
+    # A mask that the log lacks is not a number, and no integer.
+    flags = int(channels[_FLAGS]) if abs(channels[_FLAGS]) < 1e9 else 0
+    player[PRESENT], player[GOALKEEPER] = (flags & FLAG_ON_FIELD) != 0, (flags & FLAG_GOALIE) != 0
+    player[FROZEN] = (flags & FLAG_TACKLING) != 0
+    if player[PRESENT] == 0:
+        player[X] = player[Y] = FAR_AWAY_M
+    for index in range(len(_FIELDS)):
+        player[_FIELDS[index][0]] = of_type[_FIELDS[index][1]]
+    player[PAUSE] = player[FROZEN] * math.trunc(PAUSE_PART * server[TACKLE_CYCLES])
+    player[TOUCH] += server[BALL_SIZE]
+    player[AREA] = player[TOUCH] + player[MARGIN]
+    player[CATCH] = math.hypot(server[CATCH_LENGTH], server[CATCH_WIDTH] / 2)
+    player[DASH_ACCEL] = min(server[MAX_DASH] * player[DASH_RATE] * player[EFFORT_MAX], server[PLAYER_ACCEL_MAX])
+    player[TOP] = min(player[DASH_ACCEL] / (1.0 - player[DECAY]), player[SPEED_MAX])
+    player[LAG] = player[DECAY] / (1.0 - player[DECAY])
+
+
+@kernel
+def fill_scene(ball: Array, players: Array, types: Array, server: Array, scene: Array) -> None:
+    """Fill (ROWS, COLUMNS) what of a scene does not depend on the actor.
 
     Args:
-        ball: (n, 4) metres, metres per cycle. players: (n, 22, channels) as `PLAYER_CHANNELS` orders them.
-        types: (n, 22, fields) as `player_types.FIELDS`. server: (n, fields) as `server_params.FIELDS`.
+        ball: (4,) metres, metres per cycle. players: (22, channels) as `PLAYER_CHANNELS` orders them.
+        types: (22, fields) as `player_types.FIELDS`. server: (fields,) as `server_params.FIELDS`.
     """
-    made = np.zeros((len(ball), ROWS, COLUMNS))
-    made[:, BALL, : ball.shape[1]] = ball
-    made[:, BALL, DECAY] = server[:, BALL_DECAY]
-    made[:, SERVER, : len(FIELDS)] = server
-    rows = made[:, :BALL]
-    rows[..., :PRESENT] = players[..., _CHANNELS]
-    with np.errstate(invalid="ignore"):
-        flags = players[..., CHANNEL["flags"]].astype(np.int64)
-    for column, flag in ((PRESENT, FLAG_ON_FIELD), (GOALKEEPER, FLAG_GOALIE), (FROZEN, FLAG_TACKLING)):
-        rows[..., column] = (flags & flag) != 0
-    rows[rows[..., PRESENT] == 0, :VX] = FAR_AWAY_M
-    for column, name in _FIELDS:
-        rows[..., column] = types[..., TYPE_FIELD[name]]
-    of = {name: server[:, None, index] for name, index in SERVER_FIELD.items()}
-    rows[..., PAUSE] = rows[..., FROZEN] * np.trunc(PAUSE_PART * of["tackle_cycles"])
-    rows[..., TOUCH] += of["ball_size"]
-    rows[..., AREA] = rows[..., TOUCH] + rows[..., MARGIN]
-    rows[..., CATCH] = np.hypot(of["catchable_area_l"], of["catchable_area_w"] / 2)
-    full = of["max_dash_power"] * rows[..., DASH_RATE] * rows[..., EFFORT_MAX]
-    rows[..., DASH_ACCEL] = np.minimum(full, of["player_accel_max"])
-    with np.errstate(all="ignore"):  # whatever a log may hold
-        rows[..., TOP] = np.minimum(rows[..., DASH_ACCEL] / (1.0 - rows[..., DECAY]), rows[..., SPEED_MAX])
-        rows[..., LAG] = rows[..., DECAY] / (1.0 - rows[..., DECAY])
-    return made
+    for column in range(4):
+        scene[BALL, column] = ball[column]
+    scene[BALL, DECAY] = server[BALL_DECAY]
+    for column in range(len(server)):
+        scene[SERVER, column] = server[column]
+    for row in range(BALL):
+        _fill_player(scene[row], players[row], types[row], scene[SERVER])
 
 
 @kernel

@@ -27,9 +27,9 @@ from teamclone.planner.scene import (
     X,
     Y,
     along,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 STEP_DEG, DIRECTIONS, LEAST_DASHES = 6.0, 60, 5
 """Directions around the body, and dashes at least."""

@@ -31,9 +31,9 @@ from teamclone.planner.scene import (
     gap,
     gaussian,
     in_their_area,
-    kernel,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 FROM_M = 30.0
 PLACES, FASTER = 25, 0.3

@@ -39,10 +39,10 @@ from teamclone.planner.scene import (
     direction,
     gap,
     gaussian,
-    kernel,
     roll,
     turned,
 )
+from teamclone.system.compiling import kernel
 
 DIRECTIONS = 40
 """Evenly around the body; the first one is straight back."""

@@ -53,7 +53,7 @@ class Batches:
     step, are made once for all samples and kept in memory, where they fit; else a thread makes them one batch ahead.
     So are the paper's where samples are mirrored, which the compiled pass does not know; a mirror image has the inputs
     of its sample with other signs, some in other columns. On a GPU the arrays of the dataset lie on the card if they
-    fit there, and all that is done with them is done there.
+    fit there, and so do inputs that are kept; the paper's are made there.
 
     Args:
         cache_bytes: memory that inputs made once may take.
@@ -83,7 +83,10 @@ class Batches:
             self.moved = torch.nonzero(order != torch.arange(len(order))).squeeze(1).to(device)
             self.order = order.to(device)[self.moved]
         self.dataset = dataset.to(device) if self.on_card else dataset
-        self.quick = not self.on_card and type(model.features) is PaperFeatures and mirrored is None
+        self.plain = type(model.features) is PaperFeatures
+        # Kernels make the other inputs on the processor.
+        self.source = self.dataset if self.plain else dataset
+        self.quick = not self.on_card and self.plain and mirrored is None
         self._gather: Gather | None = None
         self._cache: _Cache | None = None
         if self.on_card:
@@ -95,7 +98,7 @@ class Batches:
     def _filled(self, rows: NDArray[np.int64], on_progress: Callable[[int, int], None]) -> _Cache:
         where = self.device if self.on_card else torch.device("cpu")
         cache = _Cache(rows, n=len(self.dataset), columns=len(self.inputs.names), where=where)
-        at_once = MAKE_ROWS if self.on_card else CACHE_ROWS
+        at_once = MAKE_ROWS if self.on_card and self.plain else CACHE_ROWS
         starts = range(0, len(rows), at_once)
         # Two threads even where one is asked for: one waits for memory while the other computes.
         with ThreadPoolExecutor(max(2, torch.get_num_threads())) as pool:
@@ -108,9 +111,9 @@ class Batches:
     @torch.no_grad()
     def _made(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
         """(rows, columns) inputs before normalisation, on the device."""
-        if self.on_card:
-            rows = torch.as_tensor(rows, device=self.device)
-        return self.inputs.project(self.dataset.state(rows, history=self.inputs.history).to(self.device))
+        rows = torch.as_tensor(rows).to(self.source.player_types.device)
+        state = self.source.state(rows, history=self.inputs.history)
+        return self.inputs.project(state.to(self.device) if self.plain else state).to(self.device)
 
     def _columns(self, rows: NDArray[np.int64] | Tensor) -> Tensor:
         """Return (rows, columns) inputs before normalisation, from the cache if it is on, on the device."""

@@ -28,7 +28,8 @@ def drawn(random: Random) -> tuple[dict[str, float], dict[str, float], scene.Arr
     channels = np.zeros((1, 22, len(CHANNEL)))
     channels[..., CHANNEL["flags"]] = FLAG_ON_FIELD
     channels[..., CHANNEL["vx"]] = random.uniform(0, 0.5)
-    made = scene.scenes(np.zeros((1, 4)), channels, types, server[None])[0]
+    made = np.zeros((scene.ROWS, scene.COLUMNS))
+    scene.fill_scene(np.zeros(4), channels[0], types[0], server, made)
     scene.complete(made, 0)
     return dict(zip(FIELDS, server.tolist(), strict=True)), of_type, made[scene.SERVER], made[scene.ACTOR]
 

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from benchmarks.kicks import as_planned, kicked, tackles_as_planned
+from benchmarks.kicks import as_planned, kicked, plans, tackles_as_planned
 from tests.situations import put, resting, situations
 
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.dataset.reader import open_dataset
-from teamclone.models.inputs.planned import plans
+from teamclone.planner.columns import CHOICES, MOST_VALUE_M, PLAN, VALUED
 from teamclone.planner.kick_sequences import ORDER_FIELDS, PLACE_DEG, PLACES, kick_order
-from teamclone.planner.plan import CHOICES, MOST_VALUE_M, PLAN, VALUED
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.rcss.server_params import SERVER_DEFAULTS, SERVER_FIELD
 from teamclone.store import create_store

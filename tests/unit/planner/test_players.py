@@ -25,7 +25,8 @@ def player(*, body: float = 0.0, vx: float = 0.0, flags: int = FLAG_ON_FIELD) ->
         types[..., TYPE_FIELD[name]] = value
     for name, value in (("body", body), ("vx", vx), ("flags", float(flags))):
         channels[..., CHANNEL[name]] = value
-    made: scene.Array = scene.scenes(np.zeros((1, 4)), channels, types, SERVER_DEFAULTS[None])[0]
+    made = np.zeros((scene.ROWS, scene.COLUMNS))
+    scene.fill_scene(np.zeros(4), channels[0], types[0], SERVER_DEFAULTS, made)
     scene.complete(made, 0)
     return made[0]
 

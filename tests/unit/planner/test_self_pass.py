@@ -23,7 +23,8 @@ def ends(x: float, y: float, body: float, *, stamina: float = 8000.0) -> dict[in
     for name, value in {**state, "flags": float(FLAG_ON_FIELD)}.items():
         channels[..., CHANNEL[name]] = value
     ball = np.array([[x + 0.6 * math.cos(math.radians(body)), y + 0.6 * math.sin(math.radians(body)), 0.0, 0.0]])
-    made = scene.scenes(ball, channels, types, SERVER_DEFAULTS[None])[0]
+    made = np.zeros((scene.ROWS, scene.COLUMNS))
+    scene.fill_scene(ball[0], channels[0], types[0], SERVER_DEFAULTS, made)
     made[scene.BALL, scene.GAIN] = DEFAULTS["kick_power_rate"]
     scene.complete(made, 0)
     found: dict[int, list[int]] = {}

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import open_dataset
-from teamclone.models.config import BLOCKS
+from teamclone.engine.inputs.layout import BLOCKS, GEOMETRY
 from teamclone.models.inputs.egocentric import EgocentricFeatures
-from teamclone.models.inputs.geometry import GEOMETRY
 from teamclone.models.inputs.paper import PaperFeatures
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 from teamclone.world.channels import CHANNEL

@@ -11,10 +11,11 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from teamclone.dynamics.formulas import covered, roll
+from teamclone.engine.inputs.layout import MATES
 from teamclone.models import distributions as mixture
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
-from teamclone.models.inputs.geometry import MATES, Inputs, geometry_of, mates_of
-from teamclone.planner.plan import WAYS
+from teamclone.models.inputs.geometry import Inputs, geometry_of, mates_of
+from teamclone.planner.columns import WAYS
 from teamclone.rcss import pitch
 
 BALL_COMPONENTS = 3

@@ -13,8 +13,9 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.dynamics.formulas import cycles_over
+from teamclone.engine.inputs.layout import MATES, OTHER, OTHERS
 from teamclone.models.config import ATTENTION_HEADS
-from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, Inputs, geometry_of
+from teamclone.models.inputs.geometry import Inputs, geometry_of
 from teamclone.rcss import pitch
 
 PLAYER_COLUMNS = 17

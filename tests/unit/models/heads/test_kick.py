@@ -8,8 +8,10 @@ from dataclasses import replace
 
 import pytest
 import torch
+from benchmarks.kicks import plans
 from tests.situations import situations
 
+from teamclone.engine.inputs.layout import GEOMETRY, MATES
 from teamclone.models.clone import Clone
 from teamclone.models.config import EgocentricConfig
 from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
@@ -25,9 +27,8 @@ from teamclone.models.heads.kick import (
     KickMixture,
 )
 from teamclone.models.heads.mixture import TACKLE_DIRECTIONS, MixtureHead, class_of
-from teamclone.models.inputs.geometry import GEOMETRY, MATES, InputLayout, Inputs
-from teamclone.models.inputs.planned import plans
-from teamclone.planner.plan import PLAN, WAYS
+from teamclone.models.inputs.geometry import InputLayout, Inputs
+from teamclone.planner.columns import PLAN, WAYS
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind
 from teamclone.world.mirror import mirror_state, mirror_target
 from teamclone.world.state import State, Target

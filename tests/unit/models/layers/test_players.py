@@ -8,8 +8,9 @@ import pytest
 import torch
 from tests.situations import situations
 
+from teamclone.engine.inputs.layout import MATES, OTHER, OTHERS
 from teamclone.models.inputs.egocentric import EgocentricFeatures
-from teamclone.models.inputs.geometry import MATES, OTHER, OTHERS, Inputs
+from teamclone.models.inputs.geometry import Inputs
 from teamclone.models.layers.players import PLAYER_COLUMNS, RUN_SPEED, TARGETS, PlayerEncoder
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
 from teamclone.world.state import State

@@ -6,7 +6,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from teamclone.models.inputs.geometry import GEOMETRY, geometry_of
+from teamclone.engine.inputs.layout import GEOMETRY
+from teamclone.models.inputs.geometry import geometry_of
 from teamclone.models.layers.targets import TARGET_COLUMNS, TargetPoints, layers
 
 SCALE = (0.75 * 52.5, 0.75 * 34.0)

@@ -22,7 +22,7 @@ help:
 	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name, COPIES='1 3 39' of each match)"
 	@echo "make fidelity how good clones are, and docs/explanation/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
 	@echo "make faults   kill ingest, dataset and train KILLS times each and resume (default 50)"
-	@echo "make fuzz     fuzz every log reader for MINUTES (default 30)"
+	@echo "make fuzz     fuzz every log reader for MINUTES (default 30), then their time and memory for as long"
 	@echo "make install  only set up $(VENV)"
 
 install: $(VENV)/installed
@@ -87,6 +87,7 @@ faults: install
 fuzz: install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
 	$(BIN)/python tests/faults/fuzz_readers.py .fuzz --minutes $(MINUTES)
+	$(BIN)/python tests/faults/fuzz_bounds.py --minutes $(MINUTES)
 
 clean:
 	rm -rf $(VENV) $(DEMO) site .bench $(FIDELITY) .fuzz build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def info(
-    files: Annotated[list[Path], typer.Argument(help="Logs (.rcg, .rcl, also .gz, .xz, .zst) or folders of them.")],
+    files: Annotated[list[Path], typer.Argument(help="Logs (.rcg, .rcl, also .gz, .xz, .zst, .bz2) or folders.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a match, each on a line.")] = False,
 ) -> None:
     """Show the contents of match logs: teams, score, versions, cycles, commands, and anything odd."""

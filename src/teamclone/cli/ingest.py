@@ -9,7 +9,7 @@ import typer
 
 
 def ingest(
-    paths: Annotated[list[Path], typer.Argument(help="Logs (.rcg, .rcl, also .gz, .xz, .zst) or folders of them.")],
+    paths: Annotated[list[Path], typer.Argument(help="Logs (.rcg, .rcl, also .gz, .xz, .zst, .bz2) or folders.")],
     store: Annotated[str, typer.Option(help="A folder or postgresql://USER:PASSWORD@HOST/DATABASE; made if missing.")],
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one a processor unless given.")] = None,
     scheduler: Annotated[

@@ -217,11 +217,29 @@ class _Record:
 
 @dataclass(slots=True, kw_only=True)
 class _Records:
-    """A binary log cut into records: offsets of the frames, the other records one by one."""
+    """A binary log cut into records: offsets of the frames, the other records that say something one by one.
+
+    ``complete`` is whether a message has the result.
+    """
 
     shows: list[int] = field(default_factory=list)
     others: list[_Record] = field(default_factory=list)
+    complete: bool = False
     problems: list[Problem] = field(default_factory=list)
+
+    def take(self, data: bytes, *, mode: int, start: int, stop: int) -> None:
+        """Take in the record whose bytes behind the mode these are."""
+        if mode == _SHOW:
+            self.shows.append(start)
+        elif mode == _MSG:
+            self.complete = self.complete or data.find(b"(result ", start, stop) >= 0
+        elif mode not in (_DRAW, _BLANK):
+            # The last play mode before a frame is the one that holds.
+            record = _Record(mode=mode, frame=len(self.shows), start=start, stop=stop)
+            last = self.others[-1] if self.others else None
+            if mode == _PLAYMODE and last is not None and (last.mode, last.frame) == (mode, record.frame):
+                self.others.pop()
+            self.others.append(record)
 
 
 def read_binary(data: bytes, *, path: Path | None = None) -> GameLog:
@@ -245,11 +263,10 @@ def read_binary(data: bytes, *, path: Path | None = None) -> GameLog:
     records = _cut_fixed(data, path=path) if version == 1 else _cut(data, version=version, path=path)
     if not records.shows:
         raise LogError(f"holds no frame: expected records of binary version {version}", path=path)
-    complete = any(record.mode == _MSG and b"(result " in data[record.start : record.stop] for record in records.others)
     if version == 3:
-        game = _decode_fine(data, records, complete=complete, path=path)
+        game = _decode_fine(data, records, path=path)
     else:
-        game = _decode_coarse(data, records, version=version, complete=complete, path=path)
+        game = _decode_coarse(data, records, version=version, path=path)
     # Version 1 has no header: two bytes of anything can look like one, but hardly the names as well.
     for name in (game.left.name, game.right.name):
         if name is not None and not (name.isascii() and name.isprintable()):
@@ -262,10 +279,8 @@ def _cut_fixed(data: bytes, *, path: Path | None) -> _Records:
     found = _Records()
     for start in range(0, len(data) - _V1_RECORD + 1, _V1_RECORD):
         mode = struct.unpack_from(">h", data, start)[0]
-        if mode == _SHOW:
-            found.shows.append(start + 2)
-        elif mode in (_MSG, _DRAW, _BLANK):
-            found.others.append(_Record(mode=mode, frame=len(found.shows), start=start + 2, stop=start + _V1_RECORD))
+        if mode in (_SHOW, _MSG, _DRAW, _BLANK):
+            found.take(data, mode=mode, start=start + 2, stop=start + _V1_RECORD)
         else:
             found.problems.append(_unknown(mode, path=path, byte=start))
     if len(data) % _V1_RECORD:
@@ -291,10 +306,7 @@ def _cut(data: bytes, *, version: int, path: Path | None) -> _Records:
         if size is None or start + size > len(data):
             found.problems.append(_truncated(data, path=path, byte=begin))
             break
-        if mode == _SHOW:
-            found.shows.append(start)
-        else:
-            found.others.append(_Record(mode=mode, frame=len(found.shows), start=start, stop=start + size))
+        found.take(data, mode=mode, start=start, stop=start + size)
         position = start + size
     return found
 
@@ -311,12 +323,12 @@ def _truncated(data: bytes, *, path: Path | None, byte: int) -> Problem:
 
 def _gather(data: bytes, offsets: list[int], dtype: np.dtype[np.void]) -> NDArray[np.void]:
     """Return the structs at these offsets, shape (n,)."""
-    index = np.array(offsets, np.int64)[:, None] + np.arange(dtype.itemsize)
-    structs: NDArray[np.void] = np.frombuffer(data, np.uint8)[index].view(dtype)[:, 0]
+    windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), dtype.itemsize)
+    structs: NDArray[np.void] = windows[offsets].view(dtype)[:, 0]
     return structs
 
 
-def _decode_coarse(data: bytes, records: _Records, *, version: int, complete: bool, path: Path | None) -> GameLog:
+def _decode_coarse(data: bytes, records: _Records, *, version: int, path: Path | None) -> GameLog:
     shows = _gather(data, records.shows, _SHOWINFO_T)
     players = empty_columns(columns.PLAYERS, len(shows), N_PLAYERS)
     pos = shows["pos"][:, 1:]
@@ -339,12 +351,11 @@ def _decode_coarse(data: bytes, records: _Records, *, version: int, complete: bo
         players=players,
         modes=modes,
         teams=teams,
-        complete=complete,
         path=path,
     )
 
 
-def _decode_fine(data: bytes, records: _Records, *, complete: bool, path: Path | None) -> GameLog:
+def _decode_fine(data: bytes, records: _Records, *, path: Path | None) -> GameLog:
     shows = _gather(data, records.shows, _SHORT_SHOWINFO_T2)
     found = shows["players"]
     players = empty_columns(columns.PLAYERS, len(shows), N_PLAYERS)
@@ -394,7 +405,6 @@ def _decode_fine(data: bytes, records: _Records, *, complete: bool, path: Path |
         players=players,
         modes=modes,
         teams=teams,
-        complete=complete,
         path=path,
         types=types,
         server_params=params[_SERVER],
@@ -424,7 +434,6 @@ def _log(
     players: Columns,
     modes: Sequence[tuple[int, int]],
     teams: Sequence[TeamMark],
-    complete: bool,
     path: Path | None,
     types: Mapping[int, Mapping[str, float]] | None = None,
     server_params: Mapping[str, float] | None = None,
@@ -446,6 +455,6 @@ def _log(
         player_types=player_type_columns(types or {0: {}}),
         server_params=dict(server_params or {}),
         player_params=dict(player_params or {}),
-        complete=complete,
+        complete=records.complete,
         problems=tuple(records.problems),
     )

@@ -7,7 +7,7 @@ The three differ in their first line (``ULG6``, ``JSON``, none) and in the shape
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -87,10 +87,10 @@ def read_json(data: bytes, *, path: Path | None = None) -> GameLog:
     header = data[:4]
     first_line = 2 if header in _SERVERS else 1
     start = data.find(b"\n") + 1 if header in _SERVERS else 0
-    reader = _Reader(path=path, capacity=data.count(b'"show"', start))
+    reader = _Reader(path=path)
     for line, record in _records(data, start=start, first_line=first_line, reader=reader):
         reader.take(record, line=line)
-    if not reader.n_frames:
+    if not len(reader.frames):
         raise LogError('holds no frame: expected records with "show" in a JSON array', path=path)
     return reader.finish(log_version=f"json-{_SERVERS.get(header, '19')}")
 
@@ -102,6 +102,7 @@ def _records(data: bytes, *, start: int, first_line: int, reader: _Reader) -> It
         lines.pop()
     last = len(lines) - 1
     reader.closed = bool(lines) and lines[-1].rstrip().endswith(b"]")
+    line_by_line = False
     for index, raw in enumerate(lines):
         # A record is an object: brackets and commas at the ends of a line belong to the array around it.
         text = raw.strip().lstrip(b"[").rstrip(b",]")
@@ -110,11 +111,13 @@ def _records(data: bytes, *, start: int, first_line: int, reader: _Reader) -> It
         try:
             record = orjson.loads(text)
         except orjson.JSONDecodeError:
-            if not reader.kinds and (whole := _whole_array(data[start:])) is not None:
+            # Asked once: the first line that is no record shows whether records stand on lines of their own.
+            if not line_by_line and not reader.kinds and (whole := _whole_array(data[start:])) is not None:
                 reader.closed = True
                 for record in whole:
                     yield None, record
                 return
+            line_by_line = True
             if index == last:
                 reader.closed = False
                 reader.truncated_at = first_line + index
@@ -132,39 +135,102 @@ def _whole_array(text: bytes) -> list[Any] | None:
     return records if isinstance(records, list) else None
 
 
+_BLOCK = 256
+"""Frames that are read into one array before their numbers go to the columns.
+
+A log's size does not say how many frames it has, and each takes many times the room of the shortest record.
+"""
+
+
+def _empty_block() -> Columns:
+    made = empty_columns(columns.PLAYERS, _BLOCK, N_PLAYERS)
+    return made | {
+        "cycle": np.zeros(_BLOCK, np.int32),
+        "stime": np.zeros(_BLOCK, np.int32),
+        "ball": np.full((_BLOCK, 4), np.nan),
+    }
+
+
+@dataclass(slots=True, kw_only=True)
+class _Frames:
+    """The frames read so far: blocks of columns, and the numbers of the frames that are no block yet."""
+
+    blocks: list[Columns] = field(default_factory=list)
+    n_open: int = 0
+    numbers: NDArray[np.float64] = field(default_factory=lambda: np.empty((_BLOCK, N_PLAYERS, len(_COLUMNS))))
+    columns: Columns = field(default_factory=_empty_block)
+
+    def __len__(self) -> int:
+        return (_BLOCK * len(self.blocks)) + self.n_open
+
+    def add(self, show: Record) -> None:
+        """Add a frame; a bad one changes nothing."""
+        ball = [show["ball"][key] for key in ("x", "y", "vx", "vy")]
+        players = show["players"]
+        slots = [_SLOT[player["side"]] + _unum(player["unum"]) for player in players]
+        values = [
+            [player.get(key, np.nan) for key in _NUMBERS]
+            + [counts.get(key, np.nan) for counts in (player.get("count", player),) for key in _COUNTS]
+            for player in players
+        ]
+        found = np.array(values, np.float64)
+        if ((found < _LOWEST) | (found > _HIGHEST)).any() or np.abs(ball).max() > _HIGHEST.max():
+            raise ValueError("a number beyond the range of its column")
+        qualities = [_QUALITY.get(player.get("vq"), 255) for player in players]
+        sides = [_SIDE.get(player.get("fside"), 0) for player in players]
+        frame, made = self.n_open, self.columns
+        made["cycle"][frame] = show["time"]
+        made["stime"][frame] = show.get("stime", 0)
+        made["ball"][frame] = ball
+        made["view_quality"][frame, slots] = qualities
+        made["attention_side"][frame, slots] = sides
+        self.numbers[frame] = np.nan
+        self.numbers[frame, slots] = found
+        self.n_open += 1
+        if self.n_open == _BLOCK:
+            self._close()
+
+    def _close(self) -> None:
+        for index, name in enumerate(_COLUMNS):
+            values = self.numbers[: self.n_open, :, index]
+            known = np.isfinite(values)
+            self.columns[name][: self.n_open][known] = values[known].astype(self.columns[name].dtype)
+        self.blocks.append({name: values[: self.n_open] for name, values in self.columns.items()})
+        self.columns, self.n_open = _empty_block(), 0
+
+    def finish(self) -> Columns:
+        """Return the columns of all frames."""
+        if self.n_open:
+            self._close()
+        names = list(self.columns)
+        return {name: np.concatenate([block.pop(name) for block in self.blocks]) for name in names}
+
+
 @dataclass(slots=True, kw_only=True)
 class _Reader:
-    """The content read so far. The values of all players and frames stand in arrays from the start."""
+    """The content read so far. Of problems of one code the first one and their number are kept."""
 
     path: Path | None
-    capacity: int
     closed: bool = False
     truncated_at: int | None = None
     kinds: set[str] = field(default_factory=set)
-    n_frames: int = 0
+    frames: _Frames = field(default_factory=_Frames)
     has_stime: bool = False
     version: str | None = None
-    cycle: NDArray[np.int32] = field(init=False)
-    stoppage: NDArray[np.int32] = field(init=False)
-    ball: NDArray[np.float64] = field(init=False)
-    numbers: NDArray[np.float64] = field(init=False)
-    players: Columns = field(init=False)
     modes: list[tuple[int, int]] = field(default_factory=list)
     teams: list[TeamMark] = field(default_factory=list)
     types: dict[int, dict[str, float]] = field(default_factory=dict)
     server_params: dict[str, float | str] = field(default_factory=dict)
     player_params: dict[str, float | str] = field(default_factory=dict)
-    problems: list[Problem] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.cycle = np.zeros(self.capacity, np.int32)
-        self.stoppage = np.zeros(self.capacity, np.int32)
-        self.ball = np.full((self.capacity, 4), np.nan)
-        self.numbers = np.full((self.capacity, N_PLAYERS, len(_COLUMNS)), np.nan)
-        self.players = empty_columns(columns.PLAYERS, self.capacity, N_PLAYERS)
+    warned: dict[str, tuple[Problem, int]] = field(default_factory=dict)
 
     def warn(self, code: str, text: str, *, line: int | None) -> None:
-        self.problems.append(Problem(code=code, severity=Severity.WARNING, text=text, path=self.path, line=line))
+        if code in self.warned:
+            first, number = self.warned[code]
+        else:
+            first = Problem(code=code, severity=Severity.WARNING, text=text, path=self.path, line=line)
+            number = 0
+        self.warned[code] = (first, number + 1)
 
     def take(self, record: Any, *, line: int | None) -> None:
         """Take one record in; a bad one becomes a problem."""
@@ -172,19 +238,21 @@ class _Reader:
             kind, body = _open(record)
             self._take(kind, body, line=line)
         except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
-            self.warn("bad-record", f"record left out: {type(error).__name__} {error}", line=line)
+            self.warn("bad-record", f"record left out: {type(error).__name__} {str(error)[:200]}", line=line)
 
     def _take(self, kind: str, body: Any, *, line: int | None) -> None:
         match kind:
             case "show":
-                self._show(body)
+                self.frames.add(body)
+                self.has_stime |= "stime" in body
             case "playmode":
                 mode = BY_NAME.get(body["mode"], PlayMode.NULL)
-                self.modes.append((self.n_frames, mode))
+                self.modes.append((len(self.frames), mode))
                 if mode is PlayMode.NULL:
-                    self.warn("unknown-playmode", f"play mode {body['mode']!r} is unknown, kept as 0", line=line)
+                    word = str(body["mode"])[:40]
+                    self.warn("unknown-playmode", f"play mode {word!r} is unknown, kept as 0", line=line)
             case "team":
-                self.teams.append(_team_mark(self.n_frames, body))
+                self.teams.append(_team_mark(len(self.frames), body))
             case "server_param":
                 self.server_params = _params(body)
             case "player_param":
@@ -202,46 +270,22 @@ class _Reader:
                 raise ValueError(f"unknown record {kind!r}")
         self.kinds.add(kind)
 
-    def _show(self, show: Record) -> None:
-        ball = [show["ball"][key] for key in ("x", "y", "vx", "vy")]
-        players = show["players"]
-        slots = [_SLOT[player["side"]] + _unum(player["unum"]) for player in players]
-        values = [
-            [player.get(key, np.nan) for key in _NUMBERS]
-            + [counts.get(key, np.nan) for counts in (player.get("count", player),) for key in _COUNTS]
-            for player in players
-        ]
-        found = np.array(values, np.float64)
-        if ((found < _LOWEST) | (found > _HIGHEST)).any() or np.abs(ball).max() > _HIGHEST.max():
-            raise ValueError("a number beyond the range of its column")
-        frame = self.n_frames
-        self.cycle[frame] = show["time"]
-        self.stoppage[frame] = show.get("stime", 0)
-        self.ball[frame] = ball
-        self.numbers[frame] = np.nan
-        self.numbers[frame, slots] = found
-        self.players["view_quality"][frame, slots] = [_QUALITY.get(player.get("vq"), 255) for player in players]
-        self.players["attention_side"][frame, slots] = [_SIDE.get(player.get("fside"), 0) for player in players]
-        self.has_stime |= "stime" in show
-        self.n_frames += 1
-
     def finish(self, *, log_version: str) -> GameLog:
-        n_frames = self.n_frames
-        players = {name: values[:n_frames] for name, values in self.players.items()}
-        for index, name in enumerate(_COLUMNS):
-            values = self.numbers[:n_frames, :, index]
-            known = np.isfinite(values)
-            players[name][known] = values[known].astype(players[name].dtype)
+        made = self.frames.finish()
+        problems = [
+            first if number == 1 else replace(first, text=f"{first.text}; so are {number - 1} more")
+            for first, number in self.warned.values()
+        ]
         left, right = final_teams(self.teams)
         if not self.closed:
-            self.problems.append(
+            problems.append(
                 Problem(
                     code="truncated",
                     severity=Severity.WARNING,
                     text="the file ends before its closing ]; the records before it are kept",
                     path=self.path,
                     line=self.truncated_at,
-                    cycle=int(self.cycle[n_frames - 1]),
+                    cycle=int(made["cycle"][-1]),
                 )
             )
         return GameLog(
@@ -250,19 +294,19 @@ class _Reader:
             left=left,
             right=right,
             frames=frame_columns(
-                cycle=self.cycle[:n_frames],
-                ball=self.ball[:n_frames],
+                cycle=made["cycle"],
+                ball=made["ball"],
                 modes=self.modes,
                 teams=self.teams,
                 # Converters from text do not know the counter.
-                stoppage=self.stoppage[:n_frames] if self.has_stime else None,
+                stoppage=made["stime"] if self.has_stime else None,
             ),
-            players=players,
+            players={column.name: made[column.name] for column in columns.PLAYERS},
             player_types=player_type_columns(self.types),
             server_params=self.server_params,
             player_params=self.player_params,
             complete=self.closed,
-            problems=tuple(self.problems),
+            problems=tuple(problems),
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from teamclone.logs.assemble import (
 )
 from teamclone.logs.match import Columns, GameLog, Problem, Severity
 from teamclone.logs.shows import read_shows
+from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import BY_NAME
 
 _PARAMETER = re.compile(rb'\(([A-Za-z_]\w*) (?:"([^"]*)"|([^()\s]*))\)')
@@ -30,6 +32,8 @@ _RESULT = b'"(result '
 """In the message that the server logs as it closes."""
 _PLAYMODE = re.compile(rb"\(playmode (\d+) (\w+)\)\s*$")
 _PIECE = 1 << 17
+_SHORTEST = len("(show 0((b)0 0 0 0))") + N_PLAYERS * len("((l1)0 0 0 0 0 0 0 0)")
+"""Bytes of the shortest record that is whole. No columns are made for shorter lines: a file may be full of them."""
 
 _WHAT = {
     scan.BAD_NUMBER: "a number is expected",
@@ -58,75 +62,108 @@ def read_text(data: bytes, *, path: Path | None = None) -> GameLog:
         text = "holds no frame: the server was closed before the match began"
         problems.append(Problem(code="never-began", severity=Severity.NOTE, text=text, path=path))
     frames, players, good = _scan(buffer, starts[shows], stops[shows], shows, problems, path=path)
+    statements = _Statements()
+    known = np.zeros(len(starts), np.bool_)
+    for word in _STATEMENTS:
+        known |= _begins(buffer, starts, stops, word)
     frame_of_line = np.cumsum(good)
-    modes: list[tuple[int, int]] = []
-    teams: list[TeamMark] = []
-    server_params: dict[str, float | str] = {}
-    player_params: dict[str, float | str] = {}
-    types: dict[int, dict[str, float]] = {}
-    finished = False
-    odd: list[int] = []
-    for index in np.setdiff1d(np.arange(1, len(starts)), shows, assume_unique=True):
-        line = data[starts[index] : stops[index]]
+    odd = ~known
+    odd[shows] = odd[0] = known[0] = False
+    for index in np.flatnonzero(known).tolist():
         shows_before = int(np.searchsorted(shows, index))
         frame = int(frame_of_line[shows_before - 1]) if shows_before else 0
-        if match := _PLAYMODE.match(line):
-            mode = BY_NAME.get(match[2].decode())
-            if mode is None:
-                problems.append(_unknown_mode(match, path=path, line=int(index) + 1))
-            modes.append((frame, int(mode or 0)))
-        elif match := _TEAM.match(line):
-            teams.append(_team_mark(frame, match))
-        elif line.startswith(b"(msg "):
-            finished = finished or _RESULT in line
-        elif line.startswith(b"(server_param "):
-            server_params = parameters(line)
-        elif line.startswith(b"(player_param "):
-            player_params = parameters(line)
-        elif line.startswith(b"(player_type "):
-            try:
-                number, fields = checked_type(parameters(line))
-            except ValueError:
-                odd.append(int(index))
-            else:
-                types[number] = fields
-        elif line.strip():
-            odd.append(int(index))
-    if odd:
-        problems.append(
-            Problem(
-                code="odd-line",
-                severity=Severity.WARNING,
-                text=f"{len(odd)} line(s) are no known record, the first is "
-                f"{data[starts[odd[0]] : stops[odd[0]]][:40]!r}",
-                path=path,
-                line=odd[0] + 1,
-            )
+        odd[index] = not statements.take(data[starts[index] : stops[index]], frame=frame, line=index + 1)
+    odd &= stops > starts
+    for index in np.flatnonzero(odd & _IS_BLANK[buffer[np.minimum(starts, len(buffer) - 1)]]).tolist():
+        odd[index] = bool(data[starts[index] : stops[index]].strip())
+    problems += statements.problems(path=path)
+    if n_odd := int(np.count_nonzero(odd)):
+        first = int(np.argmax(odd))
+        text = (
+            f"{n_odd} line(s) are no known record, the first is "
+            f"{data[starts[first] : min(stops[first], starts[first] + 40)]!r}"
         )
-    left_team, right_team = final_teams(teams)
+        problems.append(
+            Problem(code="odd-line", severity=Severity.WARNING, text=text, path=path, line=first + 1),
+        )
+    left_team, right_team = final_teams(statements.teams)
     return GameLog(
         log_version=data[3:4].decode(),
         left=left_team,
         right=right_team,
-        frames=frame_columns(cycle=frames["cycle"], ball=frames["ball"], modes=modes, teams=teams),
+        frames=frame_columns(
+            cycle=frames["cycle"], ball=frames["ball"], modes=statements.modes, teams=statements.teams
+        ),
         players=players,
-        player_types=player_type_columns(types),
-        server_params=server_params,
-        player_params=player_params,
-        complete=finished,
+        player_types=player_type_columns(statements.types),
+        server_params=statements.server_params,
+        player_params=statements.player_params,
+        complete=statements.finished,
         problems=tuple(problems),
     )
 
 
-def _unknown_mode(match: re.Match[bytes], *, path: Path | None, line: int) -> Problem:
-    return Problem(
-        code="unknown-playmode",
-        severity=Severity.WARNING,
-        text=f"play mode {match[2].decode()!r} is unknown, kept as 0",
-        path=path,
-        line=line,
-        cycle=limited_cycle(match[1]),
-    )
+_STATEMENTS = (b"(playmode ", b"(team ", b"(msg ", b"(server_param ", b"(player_param ", b"(player_type ")
+"""What the lines begin with that are no frames."""
+_IS_BLANK = np.zeros(256, np.bool_)
+_IS_BLANK[list(b" \t\n\r\v\f")] = True
+
+
+@dataclass(slots=True, kw_only=True)
+class _Statements:
+    """What a log says beside its frames. Of unknown play modes the first one and their number are kept."""
+
+    modes: list[tuple[int, int]] = field(default_factory=list)
+    teams: list[TeamMark] = field(default_factory=list)
+    server_params: dict[str, float | str] = field(default_factory=dict)
+    player_params: dict[str, float | str] = field(default_factory=dict)
+    types: dict[int, dict[str, float]] = field(default_factory=dict)
+    finished: bool = False
+    n_unknown: int = 0
+    unknown: tuple[int, re.Match[bytes]] | None = None
+
+    def take(self, text: bytes, *, frame: int, line: int) -> bool:
+        """Take a line in, of which ``frame`` is the next frame's index; return whether it could be read."""
+        if match := _PLAYMODE.match(text):
+            mode = BY_NAME.get(match[2].decode())
+            if mode is None:
+                self.n_unknown += 1
+                self.unknown = self.unknown or (line, match)
+            self.modes.append((frame, int(mode or 0)))
+        elif match := _TEAM.match(text):
+            self.teams.append(_team_mark(frame, match))
+        elif text.startswith(b"(msg "):
+            self.finished = self.finished or _RESULT in text
+        elif text.startswith(b"(server_param "):
+            self.server_params = parameters(text)
+        elif text.startswith(b"(player_param "):
+            self.player_params = parameters(text)
+        elif text.startswith(b"(player_type "):
+            try:
+                number, fields = checked_type(parameters(text))
+            except ValueError:
+                return False
+            self.types[number] = fields
+        else:
+            return False
+        return True
+
+    def problems(self, *, path: Path | None) -> list[Problem]:
+        """Return what was unknown."""
+        if self.unknown is None:
+            return []
+        line, match = self.unknown
+        text = f"play mode {match[2][:40].decode()!r} is unknown, kept as 0"
+        return [
+            Problem(
+                code="unknown-playmode",
+                severity=Severity.WARNING,
+                text=text if self.n_unknown == 1 else f"{text}; so are {self.n_unknown - 1} more",
+                path=path,
+                line=line,
+                cycle=limited_cycle(match[1]),
+            )
+        ]
 
 
 def _team_mark(frame: int, match: re.Match[bytes]) -> TeamMark:
@@ -172,7 +209,9 @@ def line_bounds(buffer: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[n
     """Return where each line begins and ends (without its newline), shapes (n_lines,)."""
     newlines = [np.flatnonzero(piece == ord("\n")) + at for at, piece in _pieces(buffer)]
     stops = np.concatenate([*newlines, [len(buffer)]])
-    starts = np.concatenate([[0], stops[:-1] + 1])
+    del newlines
+    starts = np.zeros_like(stops)
+    np.add(stops[:-1], 1, out=starts[1:])
     if starts[-1] == len(buffer):
         return starts[:-1], stops[:-1]
     return starts, stops
@@ -201,14 +240,20 @@ def _scan(
 ) -> tuple[Columns, Columns, NDArray[np.bool_]]:
     """Scan the show lines: cycle and ball, player columns, and which lines were good."""
     n = len(starts)
-    shows = read_shows(buffer, starts, stops)
-    good = shows.outcomes == scan.OK
+    scanned = stops - starts >= _SHORTEST
+    if n:
+        scanned[np.argmin(scanned)] = True  # the first one that is too short, for what it lacks and where
+    shows = read_shows(buffer, starts[scanned], stops[scanned])
+    whole = shows.outcomes == scan.OK
+    good = np.zeros(n, np.bool_)
+    good[scanned] = whole
     n_good = int(np.count_nonzero(good))
     if n_good < n:
         bad = np.flatnonzero(~good)
         first = int(bad[0])
+        row = int(np.count_nonzero(scanned[:first]))
         last_line = bool(len(bad) == 1 and first == n - 1 and stops[first] == len(buffer))
-        text = _WHAT[int(shows.outcomes[first])]
+        text = _WHAT[int(shows.outcomes[row])]
         problems.append(
             Problem(
                 code="truncated" if last_line else "bad-show",
@@ -218,12 +263,12 @@ def _scan(
                 else f"{text}; {len(bad)} of {n} frames are left out",
                 path=path,
                 line=int(lines[first]) + 1,
-                byte=int(shows.places[first]),
-                cycle=int(shows.cycle[first]) if shows.cycle[first] >= 0 else None,
+                byte=int(shows.places[row]),
+                cycle=int(shows.cycle[row]) if shows.cycle[row] >= 0 else None,
             )
         )
     if n and not n_good:
         raise LogError(str(problems[-1].text), path=path, line=int(lines[0]) + 1)
-    keep = slice(None) if n_good == n else good
+    keep = slice(None) if whole.all() else whole
     players = {name: column[keep] for name, column in shows.players.items()}
     return {"cycle": shows.cycle[keep], "ball": shows.ball[keep]}, players, good

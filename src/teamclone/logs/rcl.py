@@ -31,7 +31,8 @@ def read_commands(data: bytes, *, left: str | None, right: str | None, path: Pat
     """
     buffer = np.frombuffer(data, np.uint8)
     starts, stops = line_bounds(buffer)
-    capacity = count_byte(buffer, ord("(")) + len(starts)
+    # A command begins at its parenthesis; one that does not ends its message.
+    capacity = count_byte(buffer, ord("(")) + data.count(b"\tRecv ")
     # In few large arrays, which the system backs with large pages: each first touch of a small one costs a fault.
     integers = np.empty((4, capacity), np.int32)
     small = np.empty((5, capacity), np.uint8)

@@ -34,7 +34,7 @@ from teamclone.rcss.players import N_PLAYERS, TEAM_SLOTS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.system.files import digest
 
-_LOG_NAME = re.compile(r"(?P<stem>.+)\.(?P<kind>rcg|rcl)(?P<packing>\.(?:gz|xz|zst))?\Z", re.IGNORECASE | re.DOTALL)
+_LOG_NAME = re.compile(r"(?P<stem>.+)\.(?P<kind>rcg|rcl)(?P<packing>\.(?:gz|xz|zst|bz2))?\Z", re.IGNORECASE | re.DOTALL)
 _FEWEST_SENT = 0.8
 """Below this share of sent ones among the executed body commands of play_on a command log belongs to another match.
 
@@ -47,6 +47,8 @@ _SIDES = (b"l", b"r")
 _ARCHIVE = re.compile(r"\.(tar(\.\w+)?|tgz|zip|7z)\Z", re.IGNORECASE)
 _TAR = b"ustar"
 """What stands 257 bytes into a tar archive."""
+_ZIP = b"PK\x03\x04"
+"""What a zip archive begins with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +113,7 @@ def partner_of(path: Path) -> Path | None:
     if match is None:
         return None
     other = "rcl" if match["kind"].lower() == "rcg" else "rcg"
-    for packing in dict.fromkeys((match["packing"] or "", "", ".gz", ".xz", ".zst")):
+    for packing in dict.fromkeys((match["packing"] or "", "", ".gz", ".xz", ".zst", ".bz2")):
         candidate = path.with_name(f"{match['stem']}.{other}{packing}")
         if candidate.is_file():
             return candidate
@@ -122,21 +124,25 @@ def read_match(source: str | os.PathLike[str] | BinaryIO, *, partner: str | os.P
     """Read a match.
 
     Args:
-        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz or zst. Its content
-            shows which it is.
+        source: a game log or a command log, as path or binary stream, plain or packed with gz, xz, zst or bz2. Its
+            content shows which it is.
         partner: the other log. None looks for a file of the same name beside ``source``.
 
     Raises:
         LogError: nothing can be read from the source.
     """
-    if isinstance(source, str | os.PathLike):
-        path = Path(source)
-        data, broken = read_bytes(path)
-        other = Path(partner) if partner is not None else partner_of(path)
-    else:
-        path = None
-        data, broken = read_bytes(source)
-        other = None if partner is None else Path(partner)
+    given = Path(source) if isinstance(source, str | os.PathLike) else source
+    path = given if isinstance(given, Path) else None
+    other = Path(partner) if partner is not None else None if path is None else partner_of(path)
+    try:
+        return _read_match(given, other)
+    except MemoryError:
+        raise LogError("needs more memory than this process may have", path=path) from None
+
+
+def _read_match(source: Path | BinaryIO, other: Path | None) -> Match:
+    path = source if isinstance(source, Path) else None
+    data, broken = read_bytes(source)
     first = _Source(path=path, data=data, broken=broken)
     second = None
     problems: list[Problem] = []
@@ -269,6 +275,8 @@ def read_game(data: bytes, *, path: Path | None = None) -> GameLog:
         return read_binary(data, path=path)
     if data[257:262] == _TAR:
         raise LogError("is a tar archive: unpack it (tar xf) and name the logs or their folder", path=path)
+    if data.startswith(_ZIP):
+        raise LogError("is a zip archive, no game log: unpack it (unzip) and name the logs or their folder", path=path)
     raise LogError(
         f"is no game log (.rcg) of version 1 to 6 or JSON and no command log (.rcl): begins with {data[:8]!r}",
         path=path,

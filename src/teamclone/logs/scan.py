@@ -808,8 +808,10 @@ def _scan_command(
     # An unquoted say takes the rest of the datagram (the server's lexer: longest match).
     if kind == _SAY and of_player and begin < stop and _byte(buffer, begin) != 34:
         close = stop - 1
-        while close > begin and _byte(buffer, close) != 41:
+        while close >= begin and _byte(buffer, close) != 41:
             close -= 1
+        if close < begin:
+            close = -1
     if close < 0:
         texts[1, row] = stop
         return stop
@@ -933,7 +935,7 @@ def scan_commands(
         left, right: team names; a line whose sender is neither is marked as a stranger's and not read.
         integers .. texts: filled, one value a command; integers is (4, capacity): time, stoppage, line, order; args
             (4, capacity); texts (2, capacity): where the text begins and ends. The capacity must be at least the
-            number of "(" plus the number of lines.
+            number of "(" plus the number of messages.
         line_classes: (n_lines,) 0 read or of no interest, 1 referee, 2 odd, 3 from a stranger.
         line_stamps: (n_lines, 2) time and stoppage; stoppage -1 where the log has none.
         last: (3, 12, 3) room for the last time, stoppage and order of each side and number.

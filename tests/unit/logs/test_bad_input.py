@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import lzma
 import re
@@ -204,12 +205,13 @@ def test_missing_files_and_folders(tmp_path: Path):
         assert str(caught.value).startswith(f"{path}: ")
 
 
-@pytest.mark.parametrize("packing", ["", ".gz", ".xz", ".zst"])
+@pytest.mark.parametrize("packing", ["", ".gz", ".xz", ".zst", ".bz2"])
 def test_packings_and_streams(rcg_of: Callable[[str], Path], tmp_path: Path, packing: str):
     import zstandard
 
     data = gzip.decompress(rcg_of("onesided").read_bytes())
-    pack = {"": bytes, ".gz": gzip.compress, ".xz": lzma.compress, ".zst": zstandard.compress}[packing]
+    packs = {"": bytes, ".gz": gzip.compress, ".xz": lzma.compress, ".zst": zstandard.compress, ".bz2": bz2.compress}
+    pack = packs[packing]
     path = tmp_path / f"x.rcg{packing}"
     path.write_bytes(pack(data))
     with path.open("rb") as stream:
@@ -269,6 +271,10 @@ def test_archives_are_to_be_unpacked(rcg_of: Callable[[str], Path], tmp_path: Pa
         archive.add(rcg_of("v6"), arcname="one.rcg.gz")
     with pytest.raises(LogError, match=r"is a tar archive: unpack it \(tar xf\)"):
         read_match(tmp_path / "games.rcg.tar.gz")
+    (tmp_path / "one.rcg").write_bytes(b"PK\x03\x04")
+    with pytest.raises(LogError, match=r"is a zip archive, no game log: unpack it \(unzip\)"):
+        read_match(tmp_path / "one.rcg")
+    (tmp_path / "one.rcg").unlink()
     with pytest.raises(UsageError, match=r"no .rcg or .rcl file under .*; unpack games.rcg.tar.gz first"):
         find_matches([tmp_path])
 

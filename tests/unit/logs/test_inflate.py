@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import io
 import lzma
+import os
 import tracemalloc
 import zlib
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 import zstandard
@@ -19,7 +22,12 @@ from teamclone.logs.inflate import read_bytes
 CONTENT = b"".join(
     b"(show %d ((b) %d.%04d 0 0 0))\n" % (row, row * 7919 % 53, row * 104729 % 10000) for row in range(9000)
 )
-PACK: dict[str, Callable[[bytes], bytes]] = {"gz": gzip.compress, "xz": lzma.compress, "zst": zstandard.compress}
+PACK: dict[str, Callable[[bytes], bytes]] = {
+    "gz": gzip.compress,
+    "xz": lzma.compress,
+    "zst": zstandard.compress,
+    "bz2": bz2.compress,
+}
 
 
 def read(data: bytes, *, max_bytes: int = opening.MAX_BYTES) -> tuple[bytes, str | None]:
@@ -75,6 +83,7 @@ MAKERS = {
     "gz": lambda: zlib.compressobj(wbits=31),
     "xz": lambda: lzma.LZMACompressor(preset=0),
     "zst": lambda: zstandard.ZstdCompressor().compressobj(),
+    "bz2": bz2.BZ2Compressor,
 }
 
 
@@ -95,3 +104,42 @@ def test_a_bomb_is_refused_before_it_fills_the_memory(inflater: str, bomb: bytes
     finally:
         tracemalloc.stop()
     assert peak < 160 << 20
+
+
+@pytest.mark.parametrize("outer", PACK)
+@pytest.mark.parametrize("inner", PACK)
+def test_what_was_packed_twice_is_unpacked_twice(inflater: str, inner: str, outer: str):
+    assert read(PACK[outer](PACK[inner](CONTENT))) == (CONTENT, None)
+
+
+def test_what_was_packed_three_times_is_no_log(inflater: str):
+    assert read(gzip.compress(gzip.compress(gzip.compress(CONTENT))))[0][:2] == b"\x1f\x8b"
+
+
+def test_an_xz_stream_that_asks_for_much_memory_is_refused():
+    filters = [{"id": lzma.FILTER_LZMA2, "preset": 0, "dict_size": 1 << 30}]
+    packed = lzma.compress(CONTENT[:100], filters=filters)
+    with pytest.raises(LogError, match="Memory usage limit exceeded"):
+        read(packed)
+
+
+def test_a_file_is_refused_by_its_size_before_it_is_read(tmp_path: Path):
+    path = tmp_path / "sparse.rcg"
+    path.touch()
+    os.truncate(path, 30 << 30)
+    tracemalloc.start()
+    try:
+        with pytest.raises(LogError, match="more than the limit of"):
+            read_bytes(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 1 << 20
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
+    path = tmp_path / "pipe.rcg"
+    os.mkfifo(path)
+    with pytest.raises(LogError, match="is a pipe or device, expected a file"):
+        read_bytes(path)

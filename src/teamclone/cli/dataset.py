@@ -146,7 +146,8 @@ def _print(report: dict[str, Any], out: Path, *, where: str) -> None:
         if match["left_out"]:
             say(f"{match['name']} is left out: {match['left_out']}.")
         elif match["odd_frames"]:
-            say(f"{match['name']}: {match['odd_frames']} frames with missing or impossible numbers are left out.")
+            odd = "missing or impossible numbers or unknown player types"
+            say(f"{match['name']}: {match['odd_frames']} frames with {odd} are left out.")
     if without := report["matches_without_commands"]:
         names = ", ".join(without[:3]) + (", ..." if len(without) > 3 else "")
         say(f"{len(without)} match(es) have no commands to take and are in no split: {names}.")

@@ -344,6 +344,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
         commands,
         params,
         side=task.entry.side,
+        n_types=max(1, len(types[FIELDS[0]])),  # a log that describes none has the server's default type alone
         keep=task.commands,
         turn_zero=task.turn_zero,
         goalkeepers=task.goalkeepers,

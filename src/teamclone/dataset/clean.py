@@ -96,6 +96,7 @@ def clean_match(
     server_params: Mapping[str, float | str],
     *,
     side: int,
+    n_types: int | None = None,
     keep: Commands = Commands.EXECUTED,
     turn_zero: TurnZero = TurnZero.KEEP,
     goalkeepers: bool = False,
@@ -108,13 +109,14 @@ def clean_match(
         commands: COMMAND_COLUMNS, (n_commands,) in log order; of recovered commands ``columns.INTERVALS``, too.
         server_params: ranges of the arguments; the server's defaults where one is missing.
         side: the modelled team's, 1 left or -1 right.
+        n_types: how many player types the match describes; None for any.
         goalkeepers: keep the goalkeeper's commands, too.
         repertoire: the commands to keep, some of REPERTOIRE. With catch goalkeepers are modelled like other players;
             with move every play mode of a Situation is taken, not only play_on; with none a cycle without a body
             command is a sample.
     """
     everyone = "catch" in repertoire
-    in_play, whole = frames_in_play(frames, repertoire), whole_frames(frames, players)
+    in_play, whole = frames_in_play(frames, repertoire), whole_frames(frames, players, n_types=n_types)
     odd_frames = int((in_play & ~whole).sum())
     in_play &= whole
     where = "in play_on or around a set play" if "move" in repertoire else "in play_on"
@@ -162,10 +164,11 @@ def clean_match(
     )
 
 
-def whole_frames(frames: Columns, players: Columns) -> NDArray[np.bool_]:
+def whole_frames(frames: Columns, players: Columns, *, n_types: int | None) -> NDArray[np.bool_]:
     """Return (n_frames,) whether ball and players on the field have all their numbers, as numbers that can be.
 
-    A number that no frame of the log has, such as velocities in old versions, is not missed.
+    A number that no frame of the log has, such as velocities in old versions, is not missed. Every player, on the field
+    or not, must have one of the ``n_types`` player types that the match describes; None for any.
     """
     on_field = (players["state"] & state_bits.STAND) != 0
     odd = np.zeros(len(frames["cycle"]), np.bool_)
@@ -179,6 +182,8 @@ def whole_frames(frames: Columns, players: Columns) -> NDArray[np.bool_]:
         if not lacking.all():
             wrong |= lacking
         odd |= wrong if there is None else (wrong & there).any(axis=1)
+    if n_types is not None:
+        odd |= (players["type"] >= n_types).any(axis=1)
     return ~odd
 
 

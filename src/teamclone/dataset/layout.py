@@ -17,6 +17,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from teamclone.rcss.players import N_TEAM
 from teamclone.world.channels import CATEGORICAL, MEASURED
 
 FORMAT = 4
@@ -100,6 +101,19 @@ SAMPLE_ARRAYS = (
     Array(name="turn_zero", dtype="bool", shape=(), about='a (turn 0), which means "nothing to do"'),
     Array(name="split", dtype="uint8", shape=(), about="Split"),
 )
+
+
+def index_stops(*, n_matches: int, n_types: int, n_frames: int, n_commands: int) -> dict[str, int]:
+    """Return the number above all values of each array that is an index: readers gather without a check."""
+    return {
+        "frames/match": n_matches,
+        "frames/categorical type": n_types,
+        "samples/frame": n_frames,
+        "samples/player": N_TEAM,
+        "samples/kind": n_commands,
+        "samples/split": len(Split),
+    }
+
 
 MEASURED_INDEX = {channel.name: index for index, channel in enumerate(MEASURED)}
 CATEGORICAL_INDEX = {channel.name: index for index, channel in enumerate(CATEGORICAL)}

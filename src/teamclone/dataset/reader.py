@@ -25,6 +25,7 @@ from teamclone.dataset.layout import (
     STEPS,
     Array,
     Split,
+    index_stops,
 )
 from teamclone.errors import DatasetError
 from teamclone.rcss.commands import CLONED, CommandKind, not_of_repertoire
@@ -239,7 +240,7 @@ def open_dataset(path: Path | str) -> Dataset:
         raise DatasetError(f"{document}: expected commands {wrong}; make it again with `teamclone dataset`")
     types = _open(folder / "player_types.npy", dtype="float32", shape=(len(meta["matches"]), None, len(FIELDS)))
     server = _open(folder / "server_params.npy", dtype="float64", shape=(len(meta["matches"]), len(SERVER_FIELD)))
-    return Dataset(
+    opened = Dataset(
         path=folder.resolve(),
         meta=meta,
         frames=_table(folder / "frames", FRAME_ARRAYS, rows=meta["n_frames"]),
@@ -247,6 +248,31 @@ def open_dataset(path: Path | str) -> Dataset:
         player_types=types,
         server_params=server,
     )
+    _check_indices(opened)
+    return opened
+
+
+def _check_indices(dataset: Dataset) -> None:
+    """See that every index points at something: compiled code gathers without a check."""
+    frames, samples = dataset.frames, dataset.samples
+    stops = index_stops(
+        n_matches=len(dataset.matches),
+        n_types=dataset.player_types.shape[1],
+        n_frames=len(frames["match"]),
+        n_commands=len(dataset.commands),
+    )
+    arrays = {f"frames/{name}": array for name, array in frames.items()}
+    arrays |= {f"samples/{name}": array for name, array in samples.items()}
+    arrays["frames/categorical type"] = frames["categorical"][..., CATEGORICAL_INDEX["type"]]
+    for name, stop in stops.items():
+        if not arrays[name].numel():
+            continue
+        least, most = (int(value) for value in arrays[name].aminmax())
+        if least < 0 or most >= stop:
+            raise DatasetError(
+                f"{dataset.path}/{name}: expected 0..{stop - 1}, got {least}..{most}; "
+                "make the dataset again with `teamclone dataset`"
+            )
 
 
 def _table(folder: Path, arrays: tuple[Array, ...], *, rows: int) -> dict[str, Tensor]:

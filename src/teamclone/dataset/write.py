@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.dataset.layout import CATEGORICAL_INDEX, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, Split
+from teamclone.dataset.layout import CATEGORICAL_INDEX, FORMAT, FRAME_ARRAYS, SAMPLE_ARRAYS, Array, index_stops
 from teamclone.errors import DatasetError
 from teamclone.rcss.commands import CLONED
 from teamclone.rcss.player_types import FIELDS
@@ -128,14 +128,7 @@ class DatasetWriter:
             raise DatasetError(
                 f"{self._where}/player_types: expected shape ({n_matches}, types, {len(FIELDS)}), got {types.shape}"
             )
-        stops = {
-            "frames/match": n_matches,
-            "frames/categorical type": types.shape[1],
-            "samples/frame": self.n_frames,
-            "samples/player": 11,
-            "samples/kind": n_commands,
-            "samples/split": len(Split),
-        }
+        stops = index_stops(n_matches=n_matches, n_types=types.shape[1], n_frames=self.n_frames, n_commands=n_commands)
         for name, (least, most) in self._ranges.items():
             if least < 0 or most >= stops[name]:
                 raise DatasetError(f"{self._where}/{name}: expected 0..{stops[name] - 1}, got {least}..{most}")

@@ -118,7 +118,7 @@ def _run(state: Search, strategy: Strategy, crew: list[Worker], on_progress: Cal
         for worker in crew:
             if worker.trial is None and (trial := _next(state, strategy)):
                 trial.begin(Status.RUNNING)
-                worker.give(trial, config_of(trial, base), state.path / "trials" / trial.name)
+                worker.give(trial, config_of(trial, base), _folder_of(trial, state.path))
                 state.save()
                 on_progress(state)
         busy = [worker for worker in crew if worker.trial]
@@ -136,6 +136,19 @@ def _run(state: Search, strategy: Strategy, crew: list[Worker], on_progress: Cal
                     trial.status, trial.error = status, error
                     state.save()
             on_progress(state)
+
+
+def _folder_of(trial: Trial, path: Path) -> Path:
+    """Return the run folder of a trial.
+
+    Raises:
+        RunError: it, or the folder of all trials, is a link; the training would write where that points.
+    """
+    folder = path / "trials" / trial.name
+    for each in (folder.parent, folder):
+        if each.is_symlink():
+            raise RunError(f"{each}: is a link, and training would write where it points; remove it")
+    return folder
 
 
 def _next(state: Search, strategy: Strategy) -> Trial | None:

@@ -6,6 +6,7 @@ OUT/trials/NAME/  the run folder of a trial, see `training.run`
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
@@ -61,12 +62,16 @@ class Status(StrEnum):
 SETTLED = (Status.FINISHED, Status.PRUNED, Status.FAILED)
 
 
+_NAME = re.compile(r"[0-9A-Za-z][\w.+-]{0,200}", re.ASCII)
+"""What a trial may be called. It names a folder: one beside the others, whoever wrote search.json."""
+
+
 @dataclass(slots=True, kw_only=True)
 class Trial:
     """One training.
 
     Attributes:
-        name: of its folder.
+        name: of its folder, a single part of a path.
         settings: where it differs from the settings that all share: ``{"model.hidden": [256, 128]}``.
         step: of a beam search, from 0.
         parent: the trial whose neighbour this one is, in a beam search.
@@ -85,6 +90,10 @@ class Trial:
     figures: dict[str, float] = field(default_factory=dict)
     curve: list[float] = field(default_factory=list)
     error: str | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
+            raise ValueError(f"a trial is called {self.name!r}, expected letters, digits, '.', '-' and '_'")
 
     def begin(self, status: Status) -> None:
         """Reset the trial for an attempt; the worker sends earlier epochs again."""

@@ -12,7 +12,7 @@ from torch import nn
 
 from teamclone.errors import RunError
 from teamclone.system.files import write_atomic
-from teamclone.training.optimiser import Optimiser
+from teamclone.training.optimiser import Optimiser, state_shapes
 
 
 def save_weights(path: Path, model: nn.Module, *, epoch: int) -> None:
@@ -41,7 +41,11 @@ def save_progress(path: Path, model: nn.Module, optimiser: Optimiser, *, epoch: 
 
 
 def load_progress(path: Path, model: nn.Module, optimiser: Optimiser) -> int:
-    """Bring model and optimiser to the state of `save_progress`; return the number of finished epochs."""
+    """Bring model and optimiser to the state of `save_progress`; return the number of finished epochs.
+
+    Raises:
+        RunError: the file is damaged, or of another model or optimiser.
+    """
     tensors, epoch = _read(path)
     weights: dict[str, torch.Tensor] = {}
     states: dict[int, dict[str, Any]] = {}
@@ -51,10 +55,27 @@ def load_progress(path: Path, model: nn.Module, optimiser: Optimiser) -> int:
             weights[name] = tensor
         else:
             index, _, name = name.partition(".")
-            states.setdefault(int(index), {})[name] = tensor
+            states.setdefault(int(index) if index.isdecimal() else -1, {})[name] = tensor
+    _check_states(path, states, state_shapes(optimiser))
     _put(path, model, weights)
     optimiser.load_state_dict({"state": states, "param_groups": optimiser.state_dict()["param_groups"]})
     return epoch
+
+
+def _check_states(path: Path, states: dict[int, dict[str, Any]], shapes: list[dict[str, torch.Size]]) -> None:
+    """See that each state is of a weight and has its shape: fused optimisers read and write by the weight's alone."""
+    for index, state in states.items():
+        expected = shapes[index] if 0 <= index < len(shapes) else {}
+        found = {name: tensor.shape for name, tensor in state.items()}
+        if found != expected or not all(tensor.is_floating_point() for tensor in state.values()):
+            raise RunError(
+                f"{path}: of another optimiser than that of config.toml (state {index}: expected "
+                f"{_words(expected)}, got {_words(found)}); begin a new run"
+            )
+
+
+def _words(shapes: dict[str, torch.Size]) -> str:
+    return ", ".join(f"{name} {tuple(shape)}" for name, shape in sorted(shapes.items())) or "none"
 
 
 def _read(path: Path) -> tuple[dict[str, torch.Tensor], int]:

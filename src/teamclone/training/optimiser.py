@@ -114,6 +114,24 @@ class Muon:
 
 Optimiser = torch.optim.Optimizer | Muon
 
+_STATES: dict[type[torch.optim.Optimizer], tuple[str, ...]] = {
+    torch.optim.Adam: ("exp_avg", "exp_avg_sq"),
+    torch.optim.AdamW: ("exp_avg", "exp_avg_sq"),
+    torch.optim.RMSprop: ("square_avg",),
+    torch.optim.Adagrad: ("sum",),
+    Orthogonal: ("momentum",),
+}
+"""What an optimiser keeps of each weight, in the weight's shape."""
+
+
+def state_shapes(optimiser: Optimiser) -> list[dict[str, torch.Size]]:
+    """Return the names and shapes of the state that belongs to each weight, in the order of the parameter groups."""
+    if isinstance(optimiser, Muon):
+        return [shapes for part in optimiser.parts for shapes in state_shapes(part)]
+    steps = {} if isinstance(optimiser, Orthogonal) else {"step": torch.Size()}
+    weights = [weight for group in optimiser.param_groups for weight in group["params"]]
+    return [steps | dict.fromkeys(_STATES[type(optimiser)], weight.shape) for weight in weights]
+
 
 def optimiser_of(config: TrainConfig, model: nn.Module, *, precision: Literal["fp32", "bf16"] = "fp32") -> Optimiser:
     """Return the optimiser that a config asks for, of all weights of a model."""

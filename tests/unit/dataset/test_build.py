@@ -360,7 +360,9 @@ def test_a_game_log_that_implies_nothing_costs_no_other(
     assert [sum(match["rows"].values()) > 0 for match in report["matches"]] == [False, True] * 3
 
 
-@pytest.mark.parametrize(("name", "value"), [("x", np.nan), ("y", np.inf), ("stamina", np.nan), ("vx", -np.inf)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("x", np.nan), ("y", np.inf), ("stamina", np.nan), ("vx", -np.inf), ("type", 200)]
+)
 def test_frames_with_impossible_numbers_are_left_out(
     tmp_path: Path, fixtures_dir: Path, name: str, value: float
 ) -> None:

@@ -256,3 +256,23 @@ def test_damaged_arrays(tmp_path: Path, name: str) -> None:
     path.unlink()
     with pytest.raises(DatasetError, match=r"\.npy: missing"):
         open_dataset(tmp_path / "ds")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("samples/frame", 7, r"samples/frame: expected 0\.\.1, got 0\.\.7"),
+        ("samples/frame", -1, r"samples/frame: expected 0\.\.1, got -1"),
+        ("samples/player", 11, r"samples/player: expected 0\.\.10"),
+        ("samples/kind", 4, r"samples/kind: expected 0\.\.3"),
+        ("frames/match", 2, r"frames/match: expected 0\.\.1"),
+        ("frames/categorical", 254, r"frames/categorical type: expected 0\.\."),
+    ],
+)
+def test_indices_that_point_at_nothing(tmp_path: Path, name: str, value: int, words: str) -> None:
+    path = tiny(tmp_path / "ds") / f"{name}.npy"
+    values = np.load(path)
+    values[-1] = value
+    np.save(path, values)
+    with pytest.raises(DatasetError, match=words):
+        open_dataset(tmp_path / "ds")

@@ -14,6 +14,7 @@ import pytest
 from teamclone.errors import RunError, UsageError
 from teamclone.models.clone import Clone, parameter_count
 from teamclone.models.config import ACTIVATIONS, EgocentricConfig
+from teamclone.search.run import _folder_of
 from teamclone.search.strategies import Beam, Optimisers, Strategy, Study
 from teamclone.search.trials import (
     FORMAT,
@@ -296,3 +297,25 @@ def test_a_folder_that_is_no_search_is_refused(tmp_path: Path) -> None:
         (tmp_path / "search.json").write_text(text)
         with pytest.raises(RunError, match=words):
             open_search(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["/tmp/elsewhere", "../up", "a/b", "", ".", "..", ".hidden", "a\n", 7, "a" * 300])
+def test_a_trial_whose_name_is_a_path_is_refused(tmp_path: Path, name: object) -> None:
+    """A search folder from somebody else must not make trainings write elsewhere."""
+    config = SearchConfig(mode=Mode.OPTIMISERS, base=load_config("paper"))
+    dataset = {"id": "i", "path": "p", "team": "t"}
+    Search(path=tmp_path, config=config, dataset=dataset, trials=[Trial(name="good", settings={})]).save()
+    document = json.loads((tmp_path / "search.json").read_text())
+    document["trials"][0]["name"] = name
+    (tmp_path / "search.json").write_text(json.dumps(document))
+    with pytest.raises(RunError, match="a trial is called"):
+        open_search(tmp_path)
+
+
+def test_a_trial_whose_folder_is_a_link_is_not_trained(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "trials").mkdir()
+    (tmp_path / "trials" / "linked").symlink_to(tmp_path / "elsewhere")
+    assert _folder_of(Trial(name="fine", settings={}), tmp_path) == tmp_path / "trials" / "fine"
+    with pytest.raises(RunError, match="linked: is a link"):
+        _folder_of(Trial(name="linked", settings={}), tmp_path)

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import safetensors.torch
 import torch
 from tests.synthetic import make_dataset
 
@@ -15,6 +16,7 @@ from teamclone.errors import RunError
 from teamclone.models.clone import Clone
 from teamclone.training.checkpoint import load_progress, load_weights, save_progress, save_weights
 from teamclone.training.config import Config, load_config
+from teamclone.training.optimiser import Optimiser, optimiser_of
 from teamclone.training.run import FORMAT, create_run, locked, open_run
 
 
@@ -126,9 +128,43 @@ def test_the_optimiser_goes_on_as_if_never_stopped(
         assert torch.equal(tensor, other.state_dict()[name])
 
 
+@pytest.mark.parametrize("name", ["adam", "muon", "rmsprop", "adagrad"])
+def test_states_of_wrong_shape_are_refused(tmp_path: Path, name: str) -> None:
+    """Fused optimisers would read and write beyond them."""
+    config = load_config("small", [f"train.optimiser={name}"])
+    path, model = tmp_path / "r.safetensors", Clone(config.model)
+
+    def step() -> Optimiser:
+        stepper = optimiser_of(config.train, model)
+        for weights in model.parameters():
+            weights.grad = torch.ones_like(weights)
+        stepper.step()
+        return stepper
+
+    stepper = step()
+    save_progress(path, model, stepper, epoch=1)
+    assert load_progress(path, model, stepper) == 1
+    whole = safetensors.torch.load_file(path)
+    key = next(key for key in sorted(whole) if key.startswith("optimiser.") and whole[key].ndim == 2)
+    index, state = key.split(".")[1:]
+    for change in (
+        {key: torch.zeros(1)},
+        {key: torch.zeros_like(whole[key], dtype=torch.int64)},
+        {key: None} if name != "muon" else {key: torch.zeros(0)},
+        {f"optimiser.{index}.more": torch.zeros(1)},
+        {f"optimiser.9999.{state}": torch.zeros(1)},
+        {f"optimiser.x.{state}": torch.zeros(1)},
+    ):
+        tensors = {name: tensor for name, tensor in (whole | change).items() if tensor is not None}
+        safetensors.torch.save_file(tensors, path, metadata={"epoch": "1"})
+        with pytest.raises(RunError, match=r"of another optimiser than that of config\.toml"):
+            load_progress(path, model, stepper)
+
+
 HOLD = """
 import sys, time
 from pathlib import Path
+from teamclone.training.optimiser import Optimiser, optimiser_of
 from teamclone.training.run import locked
 with locked(Path(sys.argv[1])):
     print("held", flush=True)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from teamclone.logs.columns import COUNTERS, PLAYERS
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
-from teamclone.system.compiling import tell_when_compiled
+from teamclone.system.compiling import cached_kernel, tell_when_compiled
 
 Bytes = NDArray[np.uint8]
 
@@ -45,7 +45,7 @@ WRONG_PLAYERS = 3
 # kernels alone and need no way in from Python or C, which halves the time to compile.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 _helper: Any = njit(**(_OPTIONS | {"no_cpython_wrapper": True}))
-_kernel: Any = njit(**(_OPTIONS | {"nogil": True, "cache": True}))
+_kernel = cached_kernel(**_OPTIONS, nogil=True)
 
 _int: Any = np.int64
 

@@ -1,10 +1,12 @@
-"""Numba kernels: how they are compiled, and a log message before it."""
+"""Numba kernels: how they are compiled, kept on disk where there is a place, and a log message before it."""
 
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -33,6 +35,34 @@ def version_of(*modules: ModuleType) -> int:
 
 def _file(module: ModuleType) -> Path:
     return Path(str(module.__file__))
+
+
+def cached_kernel(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a function with these options of `numba.njit` and keeps its code on disk.
+
+    Where Numba finds no folder that it may write, the code is compiled anew in each process.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        try:
+            return njit(**options, cache=True)(function)
+        except RuntimeError as error:  # Numba has no class of its own for it
+            if "cannot cache" not in str(error):
+                raise
+            _tell_without_cache()
+            return njit(**options)(function)
+
+    return decorate
+
+
+@cache
+def _tell_without_cache() -> None:
+    """Warn once, and not from every worker."""
+    if multiprocessing.parent_process() is None:
+        logging.getLogger(__name__).warning(
+            "no folder to keep compiled code in, so every start compiles anew, up to a minute: "
+            "set NUMBA_CACHE_DIR to a folder that can be written"
+        )
 
 
 class _Teller(event.Listener):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 from torch import Tensor
@@ -24,6 +24,7 @@ from teamclone.models.inputs.paper import BODY_LIMIT_DEG, PaperFeatures, TypePar
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.players import N_PLAYERS
+from teamclone.system.compiling import cached_kernel
 from teamclone.world.channels import TYPE_FIELD
 
 _VX, _VY, _BODY = (MEASURED_INDEX[name] for name in ("vx", "vy", "body"))
@@ -106,7 +107,7 @@ def _prefetch_code(typing_context: Any, array: Any, index: Any) -> Any:
 _prefetch: Any = intrinsic(_prefetch_code)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@cached_kernel(nogil=True, error_model="numpy")
 def _gather(
     rows: NDArray[np.int64],
     out: NDArray[np.float32],

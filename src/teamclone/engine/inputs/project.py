@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from teamclone import planner, rcss
@@ -18,7 +17,7 @@ from teamclone.engine.inputs.look import Look, look
 from teamclone.planner.columns import PLAN
 from teamclone.planner.plan import orders_of, plan_scene
 from teamclone.planner.scene import BODY, STAMINA, Array
-from teamclone.system.compiling import kernel, tell_when_compiled, version_of
+from teamclone.system.compiling import cached_kernel, kernel, tell_when_compiled, version_of
 from teamclone.world import channels
 
 (CORE, SELF, ROLE, TYPE, LAST_COMMANDS, VIEW, BALL_SEEN, REACH, LINES, PLAN_SEEN, MATES, OPPONENTS, RIVALS, PAST, MODE,
@@ -99,7 +98,7 @@ def _compiled() -> Any:
     """Return a kernel that fills the inputs of many samples."""
     version = version_of(inputs, planner, rcss, channels)
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @cached_kernel(nogil=True, error_model="numpy")
     def project_all(
         frames: Frames,
         samples: NDArray[np.int64],

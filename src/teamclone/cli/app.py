@@ -27,6 +27,7 @@ from teamclone.cli import (
     validate,
 )
 from teamclone.cli.common import fail
+from teamclone.cli.streams import open_streams
 from teamclone.errors import TeamcloneError, UsageError
 
 EXTRAS = {
@@ -90,6 +91,7 @@ def root(version: bool = typer.Option(False, "--version", help="Print the versio
 
 def main() -> None:
     """Run a command. Exit codes: 0 fine, 1 the work failed, 2 wrong usage, 130 interrupted."""
+    open_streams()
     try:
         app()
     except UsageError as error:

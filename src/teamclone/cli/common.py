@@ -29,6 +29,13 @@ def visible(text: str) -> str:
     return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
+def json_text(value: Any, *, indent: int | None = None) -> str:
+    """Return a value as JSON, in ASCII where stdout is not UTF-8."""
+    encoding = (sys.stdout.encoding or "").lower()
+    escaped = encoding.replace("-", "") != "utf8"
+    return visible(json.dumps(value, ensure_ascii=escaped, indent=indent, default=str))
+
+
 def say(text: str = "", *, file: TextIO | None = None) -> None:
     """Print a text that may hold words of others, on stdout unless ``file`` is given."""
     print(visible(text), file=file)
@@ -42,7 +49,7 @@ def fail(text: str, *, code: int) -> NoReturn:
 
 def print_json(value: Any) -> None:
     """Print one JSON document on stdout; NaN becomes null, so that every reader takes it."""
-    say(json.dumps(_finite(value), ensure_ascii=False, indent=2, default=str))
+    print(json_text(_finite(value), indent=2))
 
 
 def _finite(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +18,7 @@ def info(
     """Show the contents of match logs: teams, score, versions, cycles, commands, and anything odd."""
     import sys
 
-    from teamclone.cli.common import say
+    from teamclone.cli.common import json_text, say
     from teamclone.errors import LogError
     from teamclone.logs import find_matches, read_pair
 
@@ -33,7 +32,7 @@ def info(
             failed = True
             continue
         found = summary(match)
-        say(json.dumps(found, ensure_ascii=False) if as_json else as_text(found))
+        say(json_text(found) if as_json else as_text(found))
     if failed:
         raise typer.Exit(1)
 

@@ -29,7 +29,12 @@ def sql(
 
     if as_csv and as_json:
         raise UsageError("--csv and --json exclude each other")
-    rows = open_store(store).stream(sys.stdin.read() if query == "-" else query)
+    try:
+        text = sys.stdin.read() if query == "-" else query
+        text.encode()
+    except UnicodeError:
+        raise UsageError("expected a query in UTF-8, got bytes of another encoding") from None
+    rows = open_store(store).stream(text)
     if as_csv:
         print_csv(rows)
     elif as_json:
@@ -73,22 +78,34 @@ def plain(value: Any) -> Any:
 
 
 def print_csv(rows: QueryRows) -> None:
-    """Print CSV with a header; NULL is empty, a list or structure is JSON."""
+    """Print CSV with a header; NULL is empty, a list or structure is JSON.
+
+    A terminal gets control characters as escapes, as in every table; a file or program gets the values as they are.
+    """
     import csv
 
-    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer = csv.writer(_Shown() if sys.stdout.isatty() else sys.stdout, lineterminator="\n")
     writer.writerow(rows.schema.names)
     for row in values(rows):
         writer.writerow([json.dumps(value) if isinstance(value, list | dict) else value for value in row])
 
 
+class _Shown:
+    """Standard output, with control characters as escapes."""
+
+    def write(self, text: str) -> None:
+        from teamclone.cli.common import visible
+
+        sys.stdout.write(visible(text))
+
+
 def print_objects(rows: QueryRows) -> None:
     """Print a JSON list, an object a line, written as the rows come."""
-    from teamclone.cli.common import visible
+    from teamclone.cli.common import json_text
 
     names, before = rows.schema.names, "["
     for row in values(rows):
-        print(before + visible(json.dumps(dict(zip(names, row, strict=True)), ensure_ascii=False)), end="")
+        print(before + json_text(dict(zip(names, row, strict=True))), end="")
         before = ",\n "
     print("[]" if before == "[" else "]")
 

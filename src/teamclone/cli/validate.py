@@ -23,10 +23,9 @@ def validate(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a match, each on a line.")] = False,
 ) -> None:
     """Check logs or a store: can all be read, and is it possible? Exit code 1 if anything is wrong."""
-    import json
     from itertools import chain
 
-    from teamclone.cli.common import progress, say
+    from teamclone.cli.common import json_text, progress, say
     from teamclone.errors import UsageError
     from teamclone.store import is_store, open_store
     from teamclone.store.validate import validate_logs, validate_store
@@ -51,7 +50,7 @@ def validate(
                 for place in stores
             ),
         ):
-            say(json.dumps(as_object(checked), ensure_ascii=False) if as_json else line(checked))
+            say(json_text(as_object(checked)) if as_json else line(checked))
             total += 1
             wrong += bool(checked.wrong)
     if not as_json:

@@ -153,15 +153,26 @@ class ParquetStore(Store):
         return QueryRows(reader.schema, _batches(reader))
 
     def _connect(self) -> duckdb.DuckDBPyConnection:
-        """Return a database in memory with the views, since the store may be read-only, moved, or growing."""
+        """Return a database in memory with the views, since the store may be read-only, moved, or growing.
+
+        Queries see the matches and no other file of this machine, and cannot change that.
+        """
         connection = duckdb.connect(
             config={
-                "temp_directory": str(Path(tempfile.gettempdir()) / f"teamclone-duckdb-{os.getpid()}"),
+                # A name that nobody else can have taken. Made where a query needs more than the memory.
+                "temp_directory": str(Path(tempfile.gettempdir()) / f"teamclone-duckdb-{uuid.uuid4().hex}"),
                 "python_enable_replacements": "false",  # a query must not see Python's variables
                 "autoinstall_known_extensions": "false",  # nor fetch code
             }
         )
-        for statement in self._views():
+        # Of a pattern the pattern itself is looked at, too.
+        allowed = ", ".join(_quoted(folder) for folder in {str(self._matches), _pattern(self._matches)})
+        closing = (
+            f"set allowed_directories = [{allowed}]",
+            "set enable_external_access = false",
+            "set lock_configuration = true",
+        )
+        for statement in (*self._views(), *closing):
             try:
                 connection.execute(statement)
             except duckdb.Error as error:
@@ -301,10 +312,14 @@ def _view(table: Table, matches: Path | None) -> str:
         body = "select " + ", ".join(f'null::{field.sql_type} as "{field.name}"' for field in table.fields)
         body += " where false"
     else:
-        # In a folder's own name *, ? and [ would be patterns.
-        folder = "".join(f"[{sign}]" if sign in "*?[" else sign for sign in str(matches))
-        body = f"select * from read_parquet({_quoted(f'{folder}/*/{table.name}.parquet')}, hive_partitioning = false)"
+        files = f"{_pattern(matches)}/*/{table.name}.parquet"
+        body = f"select * from read_parquet({_quoted(files)}, hive_partitioning = false)"
     return f"create view {table.name} as {body}"
+
+
+def _pattern(folder: Path) -> str:
+    """Return a folder as the beginning of a pattern, since in its own name *, ? and [ would be some."""
+    return "".join(f"[{sign}]" if sign in "*?[" else sign for sign in str(folder))
 
 
 def _quoted(text: str) -> str:

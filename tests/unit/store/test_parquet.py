@@ -14,7 +14,7 @@ import duckdb
 import pyarrow.parquet as pq
 import pytest
 
-from teamclone.errors import StoreError
+from teamclone.errors import StoreError, UsageError
 from teamclone.logs import Match
 from teamclone.store import create_store, is_store, open_store, parquet, schema
 
@@ -126,6 +126,23 @@ def test_a_read_only_store_can_be_asked(filled: Path) -> None:
     finally:
         for path in (filled, *filled.rglob("*")):
             path.chmod(0o755)
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "select * from read_text('{secret}')",
+        "select * from read_csv('{secret}')",
+        "select * from glob('{folder}/*')",
+        "select * from '{secret}'",
+        "select * from read_text('{store}/matches/../store.json')",
+    ],
+)
+def test_a_query_reads_no_other_file(filled: Path, tmp_path: Path, query: str) -> None:
+    secret = tmp_path / "secret.csv"
+    secret.write_text("a\n1\n")
+    with pytest.raises(UsageError):
+        open_store(filled).sql(query.format(secret=secret, folder=tmp_path, store=filled))
 
 
 def test_a_planted_link_costs_nobody_anything(filled: Path, match: Match, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
 
 import typer
@@ -89,6 +90,11 @@ def root(version: bool = typer.Option(False, "--version", help="Print the versio
         raise typer.Exit
 
 
+_NO_MEMORY = "this needs more memory than there is; ask for less at once, or close other programs"
+_OUT_OF_MEMORY = re.compile("can't allocate memory|out of memory", re.IGNORECASE)
+"""What PyTorch says, whose error has no class of its own on processors."""
+
+
 def main() -> None:
     """Run a command. Exit codes: 0 fine, 1 the work failed, 2 wrong usage, 130 interrupted."""
     open_streams()
@@ -103,6 +109,12 @@ def main() -> None:
         if missing not in EXTRAS:
             raise
         fail(f"this needs {missing}: pip install 'teamclone[{EXTRAS[missing]}]'", code=1)
+    except MemoryError:
+        fail(_NO_MEMORY, code=1)
+    except RuntimeError as error:
+        if not _OUT_OF_MEMORY.search(str(error)):
+            raise
+        fail(_NO_MEMORY, code=1)
     except KeyboardInterrupt:
         fail("interrupted", code=130)
     except BrokenPipeError:

@@ -283,9 +283,9 @@ def is_current(folder: Path, config: DatasetConfig, store: Store) -> bool:
     except DatasetError:
         return False
     wanted = [(entry.match_id, _source_of(entry, config)) for entry in _entries(store, config).usable]
-    there = [(match["match_id"], match["source"]) for match in meta["matches"]]
+    there = [(match["match_id"], match.get("source")) for match in meta["matches"]]
     options = json.loads(json.dumps(_options(config)))
-    return meta["options"] == options and there == wanted
+    return meta.get("options") == options and there == wanted
 
 
 def _source_of(entry: _Entry, config: DatasetConfig) -> str:

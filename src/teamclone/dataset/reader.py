@@ -43,6 +43,21 @@ CHECKED_FRAMES = 2**17
 """Frames that are looked at together; bounds memory."""
 
 
+_META = {
+    "id": str,
+    "team": str,
+    "teams?": [str],
+    "commands?": [str],
+    "matches": [{"match_id": str, "opponent": str, "side?": str}],
+    "n_frames": int,
+    "n_samples": int,
+    "recovered?": int,
+    "options?": (dict, type(None)),
+    "cleaning?": (dict, type(None)),
+}
+"""Of dataset.json, what readers need."""
+
+
 @cache
 def _steps(device: torch.device) -> Tensor:
     return torch.from_numpy(STEPS).to(device)
@@ -231,11 +246,14 @@ def open_dataset(path: Path | str) -> Dataset:
     folder = Path(path)
     document = folder / "dataset.json"
     meta = read_document(
-        document, what="a dataset", number=FORMAT, command="teamclone dataset", error=DatasetError, folder=folder
+        document,
+        what="a dataset",
+        number=FORMAT,
+        command="teamclone dataset",
+        error=DatasetError,
+        folder=folder,
+        shape=_META,
     )
-    absent = [key for key in ("id", "team", "matches", "n_frames", "n_samples") if key not in meta]
-    if absent:
-        raise DatasetError(f"{document}: lacks {', '.join(absent)}; make it again with `teamclone dataset`")
     if wrong := not_of_repertoire(tuple(meta.get("commands", CLONED))):
         raise DatasetError(f"{document}: expected commands {wrong}; make it again with `teamclone dataset`")
     types = _open(folder / "player_types.npy", dtype="float32", shape=(len(meta["matches"]), None, len(FIELDS)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import shutil
@@ -203,11 +204,7 @@ def writing_dataset(folder: Path | str, *, replace: bool = False) -> Iterator[Da
                     writer.close()
                 if not writer.finished:
                     return
-                old = _part(folder, f"{os.getpid()}.old")
-                if folder.exists():
-                    folder.rename(old)
-                temporary.rename(folder)
-                shutil.rmtree(old, ignore_errors=True)
+                _put_in_place(temporary, folder, replace=replace)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
@@ -259,6 +256,28 @@ def _tidy(folder: Path) -> None:
         if left.name.startswith(f".{folder.name}.") and left.suffix == ".part":
             with suppress(OSError), held(left):  # unless its writer lives
                 shutil.rmtree(left, ignore_errors=True)
+
+
+def _put_in_place(made: Path, folder: Path, *, replace: bool) -> None:
+    """Give a whole dataset its name.
+
+    Raises:
+        DatasetError: another process has put one there.
+    """
+    taken = DatasetError(f"{folder}: another process has just made it; choose another folder or remove it")
+    old = _part(folder, f"{os.getpid()}.old")
+    if folder.exists():
+        if not replace:
+            raise taken
+        folder.rename(old)
+    try:
+        made.rename(folder)
+    except OSError as error:
+        if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+            raise
+        raise taken from None
+    finally:
+        shutil.rmtree(old, ignore_errors=True)
 
 
 def _in_words(folder: Path) -> AbstractContextManager[None]:

@@ -219,4 +219,14 @@ def save_evaluation(run: Run, evaluation: dict[str, Any]) -> Path:
 
 def load_evaluation(path: Path | str) -> dict[str, Any]:
     """Read an evaluation back; raises as `read_document`."""
-    return read_document(Path(path), what="an evaluation", number=FORMAT, command="teamclone evaluate", error=RunError)
+    return read_document(
+        Path(path), what="an evaluation", number=FORMAT, command="teamclone evaluate", error=RunError, shape=_SHAPE
+    )
+
+
+_SHAPE = {
+    "run": {"path": str, "checkpoint": str, "model_id": str},
+    "dataset": {"path": str, "id": str, "own": bool},
+    "splits": dict,
+}
+"""Of evaluation.json, what says whether it is current."""

@@ -143,4 +143,7 @@ def _summary(times: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, f
 
 def load_bench(path: Path | str) -> dict[str, Any]:
     """Read bench.json back; raises as `read_document`."""
-    return read_document(Path(path), what="a benchmark", number=FORMAT, command="teamclone bench", error=RunError)
+    shape = {"model_id": str}
+    return read_document(
+        Path(path), what="a benchmark", number=FORMAT, command="teamclone bench", error=RunError, shape=shape
+    )

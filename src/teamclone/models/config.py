@@ -7,6 +7,7 @@ the preset that it is for: `paper` of `PaperConfig`, `best` of `EgocentricConfig
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import ClassVar
 
 from teamclone.engine.inputs.layout import BLOCKS
@@ -22,6 +23,13 @@ PARAMETER_LOSSES = ("paper", "masked")
 """Errors of the parameters that a point head learns by, see `loss.point_loss`."""
 LOSS_SETTINGS = ("parameter_loss", "parameter_weight", "target_weight", "extra_kicks")
 """Settings of the families that only training uses; all others make the network what it is."""
+
+
+MOST_WIDTH = 1 << 14
+"""Units of a layer."""
+MOST_LAYERS = 32
+MOST_WEIGHTS = 1 << 28
+"""Of the layers of a model: 1 GB, and three times as much in training. A slip of the pen asks for far more."""
 
 
 def _attention(width: int) -> str | None:
@@ -43,12 +51,20 @@ class ModelConfig:
 
     family: ClassVar[str]
 
-    hidden: tuple[int, ...] = setting((512, 256, 128), at_least=1, some=True)
+    hidden: tuple[int, ...] = setting((512, 256, 128), at_least=1, at_most=MOST_WIDTH, some=True, most=MOST_LAYERS)
     activation: str = setting("relu", choices=ACTIVATIONS)
     dropout: float = setting(0.0, at_least=0, at_most=0.9)
     commands: tuple[str, ...] = setting(CLONED, choices=REPERTOIRE, rule=not_of_repertoire)
-    ensemble_size: int = setting(1, at_least=1)
+    ensemble_size: int = setting(1, at_least=1, at_most=1000)
     parameter_weight: float = setting(1.0, at_least=0)
+
+    def problems(self, key: str) -> list[str]:
+        """Return what is wrong between settings; see `system.settings.from_table`."""
+        layers = [getattr(self, item.name) for item in fields(self) if item.name.endswith("hidden")]
+        weights = self.ensemble_size * sum(before * width for widths in layers for before, width in pairwise(widths))
+        if weights <= MOST_WEIGHTS:
+            return []
+        return [f"{key}: expected layers of at most {MOST_WEIGHTS:,} weights, got {weights:,}; make them narrower"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,14 +98,15 @@ class EgocentricTrunkConfig(ModelConfig):
     blocks: tuple[str, ...] = setting(
         ("self", "role", "type", "last", "ball", "reach", "lines", "plan"), choices=BLOCKS
     )
-    target_points: int = setting(6, at_least=0)
-    target_hidden: tuple[int, ...] = setting((512, 256), at_least=1)
+    target_points: int = setting(6, at_least=0, at_most=1000)
+    target_hidden: tuple[int, ...] = setting((512, 256), at_least=1, at_most=MOST_WIDTH, most=MOST_LAYERS)
 
     def problems(self, key: str) -> list[str]:
-        """Return settings that would have no effect; see `system.settings.from_table`."""
+        """Return what is wrong between settings, and those that would have no effect."""
+        found = ModelConfig.problems(self, key)
         if self.target_points:
-            return []
-        return without_effect(self, key, of_targets(type(self)), f"{key}.target_points = 0")
+            return found
+        return found + without_effect(self, key, of_targets(type(self)), f"{key}.target_points = 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,12 +140,12 @@ class EgocentricConfig(EgocentricTrunkConfig):
     family: ClassVar[str] = "egocentric"
 
     kick_blocks: tuple[str, ...] = setting(("self", "type", "last", "ball", "reach", "lines", "plan"), choices=BLOCKS)
-    parameter_hidden: tuple[int, ...] = setting((256, 128), at_least=1, some=True)
-    kick_hidden: tuple[int, ...] = setting((512, 256), at_least=1, some=True)
+    parameter_hidden: tuple[int, ...] = setting((256, 128), at_least=1, at_most=MOST_WIDTH, some=True, most=MOST_LAYERS)
+    kick_hidden: tuple[int, ...] = setting((512, 256), at_least=1, at_most=MOST_WIDTH, some=True, most=MOST_LAYERS)
     kick_dropout: float = setting(0.3, at_least=0, at_most=0.9)
-    kick_attention: int = setting(64, at_least=0, rule=_attention)
+    kick_attention: int = setting(64, at_least=0, at_most=4096, rule=_attention)
     target_weight: float = setting(0.1, at_least=0)
-    extra_kicks: int = setting(64, at_least=0)
+    extra_kicks: int = setting(64, at_least=0, at_most=1 << 20)
 
 
 def of_targets(family: type[ModelConfig]) -> tuple[str, ...]:

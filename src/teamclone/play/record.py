@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -13,7 +12,7 @@ from typing import Any, Self
 from teamclone.errors import PlayError
 from teamclone.play.schedule import TeamSpec
 from teamclone.rcss.players import N_TEAM
-from teamclone.system.documents import check_format, write_document
+from teamclone.system.documents import check_format, read_json, write_document
 
 FORMAT = 2
 NAME = "match.json"
@@ -186,7 +185,7 @@ def load_record(folder: Path) -> Record | None:
         PlayError: it is not one that this version reads.
     """
     try:
-        values = json.loads((folder / NAME).read_bytes())
+        values = read_json(folder / NAME)
         check_format(
             values["format"],
             number=FORMAT,

@@ -265,7 +265,14 @@ def make_report(
             on_progress=telling("response times"),
         )
     ahead = fresh_rollouts(run, checkpoint=evaluation["run"]["checkpoint"])
-    html = render(run, evaluation, bench, history=run.history(), ahead=ahead)
+    history = run.history()
+    try:
+        html = render(run, evaluation, bench, history=history, ahead=ahead)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, jinja2.TemplateError) as error:
+        raise RunError(
+            f"{run.path}: evaluation.json or bench.json is not what teamclone wrote ({error!r}); make them again with "
+            "`teamclone evaluate` and `teamclone bench`"
+        ) from error
     path = out or run.path / "report.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, html.encode())

@@ -88,8 +88,10 @@ def load_rollouts(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         RunError: one is missing, damaged, or of another format.
     """
     document, fans = (
-        read_document(folder / name, what="roll-outs", number=FORMAT, command="teamclone rollout", error=RunError)
-        for name in ("rollouts.json", "fans.json")
+        read_document(
+            folder / name, what="roll-outs", number=FORMAT, command="teamclone rollout", error=RunError, shape=shape
+        )
+        for name, shape in (("rollouts.json", {"model_id": str}), ("fans.json", {"fans": [dict]}))
     )
     return document, fans["fans"]
 

@@ -206,6 +206,32 @@ class Search:
         write_document(self.path / "search.json", document)
 
 
+_SHAPE = {
+    "mode": str,
+    "dataset": {"id": str, "path": str, "team": str},
+    "options": {
+        "objective": str,
+        "held": [str],
+        **dict.fromkeys(("beam?", "iterations?", "smallest?", "largest?", "trials?"), int),
+        "start?": [[int]],
+    },
+    "settings": dict,
+    "trials": [
+        {
+            "name": str,
+            "settings": dict,
+            "step": int,
+            "parent": (str, type(None)),
+            "status": str,
+            "figures": {"*": float},
+            "curve": [float],
+            "error": (str, type(None)),
+        }
+    ],
+}
+"""Of search.json."""
+
+
 def open_search(path: Path | str) -> Search:
     """Open the folder of a search.
 
@@ -222,6 +248,7 @@ def open_search(path: Path | str) -> Search:
         error=RunError,
         folder=folder,
         again="search again",
+        shape=_SHAPE,
     )
     try:
         options = document["options"]

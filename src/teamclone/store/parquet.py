@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import re
 import shutil
@@ -28,7 +27,7 @@ from teamclone.store.convert import Sources, Tables
 from teamclone.store.schema import Table
 from teamclone.store.status import FileStatus
 from teamclone.store.store import Added, QueryRows, Store
-from teamclone.system.documents import document_bytes, first_line, write_document, write_errors
+from teamclone.system.documents import document_bytes, first_line, read_json, write_document, write_errors
 from teamclone.system.files import digest, held
 
 KIND = "teamclone store"
@@ -75,7 +74,7 @@ class ParquetStore(Store):
         """
         marker = root / MARKER
         try:
-            found = json.loads(marker.read_bytes())
+            found = read_json(marker)
         except FileNotFoundError:
             problem = "holds no store" if root.is_dir() else "no such store"
             raise StoreError(f"{root}: {problem}; make one with `teamclone ingest PATH --store {root}`") from None
@@ -224,7 +223,7 @@ class ParquetStore(Store):
     def _sources(self, match_id: str) -> Sources | None:
         """Return the hashes that a match was read from; None if the store has not got it."""
         try:
-            return Sources(**json.loads((self._matches / match_id / "meta.json").read_bytes())["sources"])
+            return Sources(**read_json(self._matches / match_id / "meta.json")["sources"])
         except (FileNotFoundError, ValueError, KeyError, TypeError):
             return None
 
@@ -234,7 +233,7 @@ class ParquetStore(Store):
         for path in self._files.glob("*.json"):
             # A row that cannot be read only costs reading its file again.
             with suppress(ValueError, KeyError, TypeError, FileNotFoundError):
-                found.append(FileStatus.from_json(json.loads(path.read_bytes())))
+                found.append(FileStatus.from_json(read_json(path)))
         return sorted(found, key=lambda status: status.path)
 
     def save_files(self, statuses: Iterable[FileStatus]) -> None:

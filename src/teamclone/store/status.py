@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Self
 
+from teamclone.system.documents import misfit
 from teamclone.system.files import digest
 
 
@@ -63,11 +64,19 @@ class FileStatus:
         Raises:
             ValueError, KeyError, TypeError: the values are not those of a status.
         """
+        if problem := misfit(values, _SHAPE):
+            raise ValueError(problem)
         match_id = values["match_id"]
         # It becomes a part of paths, and a store may be somebody else's.
         if match_id is not None and re.fullmatch("[0-9a-f]{16}", match_id) is None:
             raise ValueError(f"{match_id!r} is no match id")
         return cls(**{**values, "outcome": FileOutcome(values["outcome"])})
+
+
+_TEXT = (str, type(None))
+_SHAPE = {"path": str, "outcome": str, "rows": int, "match_id": _TEXT, "error": _TEXT}
+_SHAPE |= {"size": int, "mtime_ns": int, "content": _TEXT}
+"""Of a status row."""
 
 
 def key_of(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,6 +44,77 @@ def _layout(value: Any, indent: str = "") -> str:
     return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
 
 
+Shape = Any
+"""What a part of a document must be: a type, or
+
+- a list of one shape: a list of such parts;
+- a dictionary of shapes by name: an object with these parts, and perhaps others. A name that ends in ``?`` may be
+  missing, and the name ``*`` stands for every name;
+- a tuple of shapes: any of them.
+
+A float may be a whole number, and a whole number has 64 bits.
+"""
+_WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", dict: "an object"}
+_WORDS |= {list: "a list", type(None): "null"}
+
+
+def misfit(value: Any, shape: Shape, where: str = "") -> str | None:
+    """Return the first place where a value has not a `Shape`, with what was expected and got; None where it has."""
+    if isinstance(shape, tuple):
+        found = [misfit(value, each, where) for each in shape]
+        return found[0] if None not in found else None
+    if isinstance(shape, list) and isinstance(value, list):
+        return next(filter(None, (misfit(item, shape[0], f"{where}[{at}]") for at, item in enumerate(value))), None)
+    if isinstance(shape, dict) and isinstance(value, dict):
+        return next(filter(None, (_misfit_at(value, name, inner, where) for name, inner in shape.items())), None)
+    kind = shape if isinstance(shape, type) else type(shape)
+    if kind is float:
+        fits = type(value) in (int, float)
+    elif kind is int:
+        fits = type(value) is int and abs(value) < 2**63
+    else:
+        fits = isinstance(value, kind)
+    if fits:
+        return None
+    got = json.dumps(value, ensure_ascii=False, default=str)
+    return f"{where}: expected {_WORDS[kind]}, got {got[:40]}{'...' if len(got) > 40 else ''}".removeprefix(": ")
+
+
+def _misfit_at(value: dict[str, Any], name: str, shape: Shape, where: str) -> str | None:
+    """Return what is wrong with the part of an object that a name of its shape stands for."""
+    before = f"{where}." if where else ""
+    if name == "*":
+        return next(filter(None, (misfit(part, shape, f"{before}{key}") for key, part in value.items())), None)
+    key = name.removesuffix("?")
+    if key in value:
+        return misfit(value[key], shape, f"{before}{key}")
+    return None if key != name else f"{before}{key}: missing"
+
+
+def read_json(path: Path) -> Any:
+    """Return the content of a JSON file.
+
+    Raises:
+        ValueError: it is no JSON, has a number that is none or infinite, or is nested too deep.
+        OSError: it cannot be read.
+    """
+    try:
+        return json.loads(path.read_bytes(), parse_constant=_no_number, parse_float=_finite_number)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
+def _no_number(text: str) -> Any:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _finite_number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:40]} is too great")
+    return value
+
+
 def read_document(
     path: Path,
     *,
@@ -50,6 +122,7 @@ def read_document(
     number: int,
     command: str,
     error: type[TeamcloneError],
+    shape: Shape = dict,
     folder: Path | None = None,
     again: str | None = None,
 ) -> dict[str, Any]:
@@ -61,15 +134,16 @@ def read_document(
         number: the format that the caller reads.
         command: the command that makes such a document: ``teamclone train``.
         error: the class of the error.
+        shape: see `Shape`.
         folder: the folder that the document describes, which the messages then name; None for a document of its own.
         again: the remedy for another format; None for giving ``command`` again.
 
     Raises:
-        error: the document is missing, is none, or has another format number.
+        error: the document is missing, is none, or has another format number or shape.
     """
     again = again or f"make it again with `{command}`"
     try:
-        document: dict[str, Any] = json.loads(path.read_bytes())
+        document: dict[str, Any] = read_json(path)
         found = document["format"]
     except (FileNotFoundError, NotADirectoryError):
         if folder is None:
@@ -79,6 +153,8 @@ def read_document(
     except (ValueError, TypeError, KeyError) as problem:
         raise error(not_a_document(path, what if folder is None else f"the description of {what}", problem)) from None
     check_format(found, number=number, what=what.partition(" ")[2], where=folder or path, again=again, error=error)
+    if wrong := misfit(document, shape):
+        raise error(f"{path}: {wrong}; {again}")
     return document
 
 

@@ -26,7 +26,7 @@ class Bounds:
     Attributes:
         choices: the words to choose from; empty where any will do.
         at_least, above, at_most, below: of a number.
-        items: how many items a list has; None for any number. some: a list has at least one.
+        items: how many items a list has; None for any number. some: a list has at least one. most: and at most so many.
         rule: of the whole value: returns what was expected, or None where the value is right.
     """
 
@@ -37,6 +37,7 @@ class Bounds:
     below: float = math.inf
     items: int | None = None
     some: bool = False
+    most: int | None = None
     rule: Callable[[Any], str | None] | None = None
 
 
@@ -60,7 +61,7 @@ def value_of(text: str) -> Any:
     """Return the value of a text in TOML's notation; any other text is a word."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text
 
 
@@ -183,6 +184,8 @@ def _list(key: str, value: Any, kind: Any, bounds: Bounds) -> tuple[Any, ...]:
         raise UsageError(f"{key}: expected {bounds.items} values, got {list(converted)}")
     if bounds.some and not converted:
         raise UsageError(f"{key}: expected at least one value, got none")
+    if bounds.most is not None and len(converted) > bounds.most:
+        raise UsageError(f"{key}: expected at most {bounds.most} values, got {len(converted)}")
     if bounds.choices and len(set(converted)) != len(converted):
         raise UsageError(f"{key}: names one more than once: {', '.join(converted)}")
     return converted

@@ -47,10 +47,10 @@ class DataConfig:
         mirror: share of the training samples that are shown reflected at the long axis, see `world.mirror`.
     """
 
-    batch_size: int = setting(4096, at_least=1)
-    batches_per_epoch: int = setting(300, at_least=1)
+    batch_size: int = setting(4096, at_least=1, at_most=1 << 24)
+    batches_per_epoch: int = setting(300, at_least=1, at_most=1 << 24)
     repeat: bool = setting(False)
-    validation_batches: int = setting(200, at_least=0)
+    validation_batches: int = setting(200, at_least=0, at_most=1 << 24)
     cache_gb: float = setting(8.0, at_least=0)
     mirror: float = setting(0.0, at_least=0, at_most=1)
 
@@ -81,7 +81,7 @@ class TrainConfig:
     """
 
     # Beyond the upper bounds a share is none, or PyTorch itself overflows.
-    epochs: int = setting(400, at_least=1)
+    epochs: int = setting(400, at_least=1, at_most=1 << 24)
     optimiser: str = setting("adam", choices=("adam", "rmsprop", "adagrad", "muon"))
     learning_rate: float = setting(0.001, above=0, at_most=1000)
     schedule: str = setting("constant", choices=("constant", "cosine"))
@@ -94,7 +94,7 @@ class TrainConfig:
     calibrate: bool = setting(False)
     precision: str = setting("auto", choices=("auto", "fp32", "bf16"))
     device: str = setting("auto", choices=("auto", "cpu", "cuda"))
-    threads: int = setting(0, at_least=0)
+    threads: int = setting(0, at_least=0, at_most=4096)
     seed: int = setting(0, at_least=0, at_most=2**63 - 1)
     max_minutes: float = setting(0.0, at_least=0)
 

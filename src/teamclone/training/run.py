@@ -32,7 +32,7 @@ from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError, UsageError
 from teamclone.models.clone import Clone
 from teamclone.rcss.commands import REPERTOIRE
-from teamclone.system.documents import not_a_document, read_document, write_document
+from teamclone.system.documents import misfit, read_document, write_document
 from teamclone.system.files import held, write_atomic
 from teamclone.system.machine import processor
 from teamclone.training.checkpoint import load_weights, save_weights
@@ -46,6 +46,15 @@ RESUME = "resume"
 
 BASE = "base"
 """The checkpoint from which an adapted run begins, its own copy; a model to load as any other."""
+
+_BASE = {"path": str, "checkpoint": str, "model_id": str, "team": str, "trained_on": ([str], type(None))}
+_ENVIRONMENT = {
+    "dataset": {"path": str, "id": str, "team": str},
+    **dict.fromkeys(("created?", "teamclone?", "torch?", "numpy?", "processor?"), str),
+    f"{BASE}?": _BASE,
+}
+_RECORD = {"epoch": int, "*": float}
+"""Of metrics.jsonl."""
 
 
 BEST: dict[str, tuple[str, Callable[[float, float], bool]]] = {
@@ -128,15 +137,21 @@ class Run:
 
         ``epoch`` (from 1), ``samples`` trained on in it, ``samples_per_s``, ``seconds`` (with validation), and the
         figures of `metrics.RunningMetrics.table` under ``train_`` and ``validation_``: ``validation_accuracy``.
+
+        Raises:
+            RunError: a record is none.
         """
         if not self.metrics_path.is_file():
             return []
         records = []
-        for line in self.metrics_path.read_text(encoding="utf-8").splitlines():
+        for number, line in enumerate(self.metrics_path.read_bytes().splitlines(), 1):
             try:
-                records.append(json.loads(line))
-            except ValueError:  # cut off by a kill in the midst of writing; resuming writes it again
+                record = json.loads(line)
+            except (ValueError, RecursionError):  # cut off by a kill in the midst of writing; resuming writes it again
                 break
+            if problem := misfit(record, _RECORD):
+                raise RunError(f"{self.metrics_path}: line {number}: {problem}; remove the line and resume the run")
+            records.append(record)
         return records
 
     def best(self) -> list[Best]:
@@ -184,16 +199,13 @@ def open_run(path: Path | str) -> Run:
         error=RunError,
         folder=folder,
         again="train again",
+        shape=_ENVIRONMENT,
     )
-    try:
-        _ = [environment["dataset"][name] for name in ("path", "id", "team")]
-    except (TypeError, KeyError) as error:
-        raise RunError(not_a_document(environment_path, "the description of a run", error)) from None
     if not config_path.is_file():
         raise RunError(f"{folder}: not a run, it has no config.toml; make one with `teamclone train`")
     try:
         config = config_from(tomllib.loads(config_path.read_text(encoding="utf-8")), where=str(config_path))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise RunError(f"{config_path}: not TOML ({error})") from None
     except UsageError as error:
         raise RunError(str(error)) from None

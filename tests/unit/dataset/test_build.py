@@ -542,6 +542,24 @@ def test_what_is_there_stays_until_the_new_one_is_whole(store: Store, config: Da
     assert list(tmp_path.iterdir()) == [out]
 
 
+def test_of_two_writers_at_once_the_later_one_does_not_take_the_place(
+    store: Store, config: DatasetConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build_dataset(dataclasses.replace(config, seed=7), store=store, out=tmp_path / "other", jobs=1)
+    meta = build._meta
+
+    def meanwhile(*arguments: Any) -> dict[str, Any]:
+        """Another process ends just before ours."""
+        (tmp_path / "other").rename(tmp_path / "ds")
+        return meta(*arguments)
+
+    monkeypatch.setattr(build, "_meta", meanwhile)
+    with pytest.raises(DatasetError, match="another process has just made it"):
+        build_dataset(config, store=store, out=tmp_path / "ds", jobs=1)
+    assert json.loads((tmp_path / "ds" / "dataset.json").read_text())["options"]["seed"] == 7
+    assert list(tmp_path.iterdir()) == [tmp_path / "ds"]
+
+
 def test_leftovers_of_killed_writers_go_but_not_those_at_work(
     store: Store, config: DatasetConfig, tmp_path: Path
 ) -> None:

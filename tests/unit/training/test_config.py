@@ -245,6 +245,24 @@ def test_another_family_keeps_what_both_have_and_has_its_own_defaults() -> None:
     assert "model.parameter_loss: nothing became masked" in differences(config, other)
 
 
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("model.hidden=[1000000000]", "model.hidden: expected at most 16384"),
+        (f"model.hidden={[8] * 100}", "model.hidden: expected at most 32 values, got 100"),
+        ("model.hidden=[16384,16384,16384]", "model: expected layers of at most 268,435,456 weights, got 537,1"),
+        ("model.ensemble_size=100000000", "model.ensemble_size: expected at most 1000"),
+        ("model.target_points=100000000", "model.target_points: expected at most 1000"),
+        ("model.kick_attention=400000000", "model.kick_attention: expected at most 4096"),
+        ("train.threads=1000000000000", "train.threads: expected at most 4096"),
+        ("model.dropout=" + "[" * 100_000, "model.dropout: expected a number"),
+    ],
+)
+def test_what_no_machine_has_room_for_is_refused(setting: str, words: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(words)):
+        load_config("best", [setting])
+
+
 def test_unknown_presets_and_sections() -> None:
     with pytest.raises(UsageError, match=r"no preset 'papr'; did you mean paper\?"):
         load_config("papr")

@@ -74,5 +74,5 @@ def test_settings_have_choices_bounds_and_defaults() -> None:
     page = PAGES[generate.REFERENCE / "settings.md"]
     assert '| `train.optimiser` | `adam`, `rmsprop`, `adagrad`, `muon` | `"adam"` |' in page
     assert "| `model.dropout` | number, at least 0, at most 0.9 | `0.0` |" in page
-    assert "| `model.hidden` | list: whole number, at least 1 | `[512, 256, 128]` |" in page
+    assert "| `model.hidden` | list: whole number, at least 1, at most 16384 | `[512, 256, 128]` |" in page
     assert "| `data.repeat` | switch | `false` |" in page

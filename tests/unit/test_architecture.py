@@ -61,7 +61,7 @@ MAY_IMPORT_TORCH = (
 )
 
 MOST_LINES = 80
-KERNEL = re.compile(r"_?(njit|kernel|helper)\b")
+KERNEL = re.compile(r"_?(njit|kernel|cached_kernel|helper)\b")
 """Decorators by which Numba compiles a function. It inlines no call, so a kernel may be long."""
 
 TELLING_DEFAULTS = (0.94, 130600, 0.085)

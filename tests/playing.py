@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+from typing import IO
 
 import psutil
 
@@ -12,6 +13,8 @@ from teamclone.play.processes import MARK
 
 STANDIN = Path(__file__).resolve().parent / "standin"
 TEAM = f"{STANDIN}/team --host {{host}} --port {{port}} --name {{team}}"
+CLIENT = f"{TEAM} --olcoach-port {{olcoach_port}} --unum {{unum}}"
+"""One client of a team."""
 
 
 def strays(folder: Path) -> list[str]:
@@ -57,7 +60,8 @@ def write_schedule(
     return path
 
 
-def started(schedule: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
+def started(
+    schedule: Path, out: Path, *options: str, stderr: int | IO[bytes] = subprocess.DEVNULL
+) -> subprocess.Popen[bytes]:
     command = [str(TEAMCLONE), "play", str(schedule), "--out", str(out), *options]
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen(command, stdout=quiet, stderr=quiet, start_new_session=True)
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr, start_new_session=True)

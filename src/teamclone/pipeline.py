@@ -16,15 +16,15 @@ from teamclone.errors import PlayError, UsageError
 from teamclone.evaluation.evaluate import evaluate_and_save
 from teamclone.play.record import Record
 from teamclone.play.runner import PlayReport, play
-from teamclone.play.schedule import Schedule, folder_of, read_schedule, schedule_from
+from teamclone.play.schedule import Schedule, folder_of, read_schedule, schedule_of
 from teamclone.play.server import find_server
 from teamclone.report.page import fresh_evaluation, make_report
 from teamclone.store import create_store
 from teamclone.store.postgres.location import masked
-from teamclone.system.settings import from_table
-from teamclone.training.config import Config, differences, load_config
+from teamclone.system.settings import from_table, setting
+from teamclone.training.config import Config, differences, load_config, preset_names
 from teamclone.training.loop import Progress, train
-from teamclone.training.run import Run, is_run, open_run
+from teamclone.training.run import BEST, LAST, Run, is_run, open_run
 
 STORE, DATASET, RUN = "store", "dataset", "run"
 """Folders beside those that `play` makes."""
@@ -51,7 +51,7 @@ class StoreSettings:
 class TrainSettings:
     """A preset and changes to it: ``"train.epochs=10"``."""
 
-    preset: str = "best"
+    preset: str = setting("best", choices=tuple(preset_names()))
     set: tuple[str, ...] = ()
 
 
@@ -59,7 +59,7 @@ class TrainSettings:
 class EvaluateSettings:
     """Which weights to evaluate."""
 
-    checkpoint: str = "best-loss"
+    checkpoint: str = setting("best-loss", choices=(LAST, *BEST))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,11 +85,12 @@ class StageResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """The callbacks of a pipeline: for the steps of a stage, the records of matches, the progress of training."""
+    """The callbacks of a pipeline: for the steps of a stage, records of matches, training, matches that are ended."""
 
     on_progress: Callable[[Stage, int, int], None] = lambda stage, done, total: None
     on_record: Callable[[Record], None] = lambda record: None
     on_training: Callable[[Progress], None] = lambda progress: None
+    on_stop: Callable[[], None] = lambda: None
 
     def steps(self, stage: Stage) -> Callable[[int, int], None]:
         """Return a stage's callback, for the steps that are done and their number."""
@@ -103,30 +104,28 @@ def load_pipeline(path: Path) -> Pipeline:
         UsageError: naming all mistakes, in one line.
     """
     table = read_schedule(path)
-    schedule = schedule_from(table, where=str(path), base=folder_of(path))
     problems: list[str] = []
+    schedule = schedule_of(table, base=folder_of(path), problems=problems)
     store = from_table(StoreSettings, table.get("store", {}), "store", problems)
+    before = len(problems)
     training = from_table(TrainSettings, table.get("train", {}), "train", problems)
+    is_right = len(problems) == before
     evaluation = from_table(EvaluateSettings, table.get("evaluate", {}), "evaluate", problems)
-    config = None
-    if "dataset" in table:
-        config = from_table(DatasetConfig, table["dataset"], "dataset", problems)
+    config = from_table(DatasetConfig, table["dataset"], "dataset", problems) if "dataset" in table else None
+    trained = None
+    if "train" in table and is_right:
         try:
-            config.check()
+            trained = load_config(training.preset, training.set, where="train.set")
         except UsageError as error:
-            problems.append(f"dataset: {error}")
+            problems.append(str(error))
     for name, needs in (("train", "dataset"), ("evaluate", "train")):
         if name in table and needs not in table:
             problems.append(f"[{name}] needs [{needs}]")
-    if problems:
-        raise UsageError(f"{path}: {'; '.join(problems)}")
-    trained = load_config(training.preset, training.set) if "train" in table else None
     if config and trained and trained.model.commands != config.repertoire:
-        wanted = ",".join(config.repertoire)
-        raise UsageError(
-            f'{path}: train.set: expected "model.commands={wanted}", as [dataset] has them, '
-            f"got {','.join(trained.model.commands)}"
-        )
+        wanted, got = (",".join(commands) for commands in (config.repertoire, trained.model.commands))
+        problems.append(f'train.set: expected "model.commands={wanted}", as [dataset] has them, got {got}')
+    if problems:
+        raise UsageError(f"{path}: {'; '.join(dict.fromkeys(problems))}")
     location = store.location
     if location and "://" not in location:
         location = str(folder_of(path) / Path(location).expanduser())
@@ -184,12 +183,14 @@ def run_pipeline(
         jobs=jobs,
         on_progress=watch.steps(Stage.PLAY),
         on_record=watch.on_record,
+        on_stop=watch.on_stop,
     )
     complete = len(report.records) - len(report.failed)
     text = f"{complete} matches in {masked(store.location)}, {len(report.failed)} failed"
     report_stage(Stage.PLAY, text, done=report.played > 0)
     if not complete:
-        raise PlayError(f"{out}: no match of the schedule is complete: {report.failed[0].trouble.text}")  # type: ignore[union-attr]
+        again = "; teamclone play with --retry-failed tries them again" if report.failed_before else ""
+        raise PlayError(f"{out}: no match of the schedule is complete: {report.failed[0].trouble.text}{again}")  # type: ignore[union-attr]
     if pipeline.dataset is None:
         return report, results
 

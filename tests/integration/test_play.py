@@ -15,6 +15,8 @@ import socket
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +25,11 @@ import pytest
 
 from command import teamclone
 from disk import small_disk
-from playing import STANDIN, TEAM, started, strays, write_schedule
+from playing import CLIENT, STANDIN, TEAM, started, strays, write_schedule
 from teamclone.errors import UsageError
 from teamclone.logs import read_match
+from teamclone.pipeline import load_pipeline
+from teamclone.play.ports import held_ports
 from teamclone.play.record import NAME
 from teamclone.play.runner import _attempt
 from teamclone.play.schedule import load_schedule
@@ -195,12 +199,131 @@ def test_a_match_over_its_time_is_ended(tmp_path: Path) -> None:
 
 
 @both_servers
-def test_a_wrong_option_is_told_in_the_server_s_words(tmp_path: Path, server: str) -> None:
-    schedule = write_schedule(tmp_path, [("Red", "Blue")], server=server)
-    schedule.write_text(schedule.read_text().replace("kick_off_wait", "kick_of_wait"))
-    trouble = one(schedule, tmp_path / "out")
-    assert trouble["fault"] == "server did not start"
-    assert "kick_of_wait" in trouble["text"]
+def test_a_wrong_option_stops_all_in_the_server_s_words_and_costs_no_attempt(tmp_path: Path, server: str) -> None:
+    out = tmp_path / "out"
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], server=server, matches=9, attempts=3)
+    right = schedule.read_text()
+    schedule.write_text(right.replace("kick_off_wait", "kick_of_wait"))
+    done = teamclone("play", schedule, "--out", out, "-j", 1, code=1)
+    assert "server did not start on " in done.stderr
+    assert "kick_of_wait" in done.stderr
+    assert "mend the server or its options and give the command again, matches played stay" in done.stderr
+    assert "of 9: " not in done.stderr
+    assert not list((out / "failed").iterdir())
+    schedule.write_text(right.replace("matches = 9", "matches = 1"))
+    assert play(schedule, out)["complete"] == 1
+
+
+def test_a_server_without_its_libraries_stops_all_and_one_that_is_killed_costs_an_attempt(tmp_path: Path) -> None:
+    server = tmp_path / "server"
+    server.write_text("#!/bin/sh\necho libX.so.18: cannot open shared object file; exit 127\n")
+    server.chmod(0o755)
+    schedule, out = write_schedule(tmp_path, [("Red", "Blue")], server=str(server), matches=2), tmp_path / "out"
+    done = teamclone("play", schedule, "--out", out, code=1)
+    assert "the server ended with code 127: libX.so.18: cannot open shared object file" in done.stderr
+    assert not list((out / "failed").iterdir())
+    server.write_text("#!/bin/sh\nkill -9 $$\n")
+    records = play(schedule, out, code=1)["records"]
+    assert [record["trouble"]["fault"] for record in records] == ["server died"] * 2
+
+
+def small_team(coach: str = "", *, players: int = 2, player: str = CLIENT) -> str:
+    """The table of a team of one process for each client."""
+    return f"player = '''{player}'''\nplayers = {players}\n" + (f"coach = '''{coach}'''" if coach else "")
+
+
+@both_servers
+def test_fewer_than_eleven_play_a_match_from_its_beginning_to_its_end(tmp_path: Path, server: str) -> None:
+    teams = {"Red": small_team(CLIENT, players=1), "Blue": f"players = 4\ncommand = '''{TEAM} --players 4'''"}
+    [record] = play(write_schedule(tmp_path, [("Red", "Blue")], server=server, teams=teams), tmp_path / "out")[
+        "records"
+    ]
+    assert (record["outcome"], record["cycles"]) == ("complete", 40)
+    assert (record["left"]["coach"], record["right"]["coach"]) == (True, False)
+    assert record["right"]["missed"] == [0] * 11
+    match = read_match(tmp_path / "out" / "matches" / "Red-vs-Blue-1" / record["logs"][0])
+    assert match.game.complete
+    there = (match.players["state"][0] != 0).reshape(2, -1)
+    assert there.sum(1).tolist() == [1, 4]
+
+
+def test_who_of_fewer_than_eleven_crashes_or_never_comes_is_told(tmp_path: Path) -> None:
+    teams = {
+        "Red": small_team(),
+        "Crash": small_team(player=f"{CLIENT} --crash-at 12"),
+        "Late": small_team(player=f"{CLIENT} --never-connect", players=3),
+    }
+    pairings = [("Red", "Crash"), ("Late", "Red")]
+    schedule = write_schedule(tmp_path, pairings, teams=teams, half_time=30, limits="connect_s = 2")
+    crash, late = (record["trouble"] for record in play(schedule, tmp_path / "out", code=1)["records"])
+    assert (crash["fault"], crash["side"], crash["unums"]) == ("crashed", "right", [1, 2])
+    assert crash["text"].startswith("Crash: the whole team is gone")
+    assert late["fault"] == "never connected"
+    assert "Late: 0 of 3 players connected within 2 s" in late["text"]
+
+
+@both_servers
+@pytest.mark.parametrize(
+    ("coach", "words"),
+    [
+        (CLIENT.replace("{team}", "Stranger"), "Blue: the coach never connected, it "),
+        ("sleep 1000", "Blue: the coach never connected, it still runs: it printed nothing"),
+        ("true", "Blue: the coach never connected, it ended with code 0: it printed nothing"),
+    ],
+    ids=["refused", "never comes", "ends well"],
+)
+def test_a_coach_that_never_connects_fails_the_match(tmp_path: Path, server: str, coach: str, words: str) -> None:
+    teams = {"Red": small_team(CLIENT), "Blue": small_team(coach)}
+    trouble = one(write_schedule(tmp_path, [("Red", "Blue")], server=server, teams=teams), tmp_path / "out")
+    assert (trouble["fault"], trouble["side"]) == ("never connected", "right")
+    assert words in trouble["text"]
+
+
+def test_a_coach_that_does_not_come_in_time_ends_the_match(tmp_path: Path) -> None:
+    teams = {"Red": small_team(), "Blue": small_team("sleep 1000")}
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], half_time=3000, limits="connect_s = 5", teams=teams)
+    assert one(schedule, tmp_path / "out")["fault"] == "never connected"
+
+
+def test_a_script_that_starts_no_coach_is_told_with_the_outcome(tmp_path: Path) -> None:
+    script = f'sh -c "test $3 = 12 || exec {TEAM} --unum $3" start'
+    teams = {"Red": f"start = '''{script}'''\nplayers = 2", "Blue": small_team()}
+    done = teamclone("play", write_schedule(tmp_path, [("Red", "Blue")], teams=teams), "--out", tmp_path / "out")
+    assert "1 of 1: Red-vs-Blue-1: Red 0 : 0 Blue, " in done.stderr
+    assert ", without the coach of Red\n" in done.stderr
+
+
+def test_a_match_that_waits_for_the_default_ports_holds_no_slot_and_does_not_count_it(tmp_path: Path) -> None:
+    old = f"players = 2\ncommand = '''{TEAM.replace('{port}', '6000')} --players 2'''"
+    teams, out = {"Old": old, "Red": small_team(), "Blue": small_team()}, tmp_path / "out"
+    schedule = write_schedule(tmp_path, [("Old", "Red"), ("Red", "Blue")], teams=teams)
+    with held_default_ports():
+        process = started(schedule, out, "-j", "1")
+        deadline = time.monotonic() + 60
+        while not (out / "matches" / "Red-vs-Blue-1").exists():
+            assert process.poll() is None
+            assert time.monotonic() < deadline, "the match that needs no default port does not end"
+            time.sleep(0.1)
+        released = time.time()
+    assert process.wait(60) == 0
+    names = ("Old-vs-Red-1", "Red-vs-Blue-1")
+    waited, free = (json.loads((out / "matches" / name / NAME).read_text()) for name in names)
+    assert waited["ports"] == [6000, 6001, 6002]
+    assert free["ports"] != waited["ports"]
+    assert datetime.fromisoformat(waited["started"]).timestamp() >= int(released)
+
+
+@contextmanager
+def held_default_ports() -> Iterator[None]:
+    """Hold the default ports as another match does, once those that have them give them back."""
+    with ExitStack() as stack:
+        while True:
+            try:
+                stack.enter_context(held_ports(any_block=False))
+                break
+            except BlockingIOError:
+                time.sleep(0.1)
+        yield
 
 
 def test_without_a_server_nothing_is_begun(tmp_path: Path) -> None:
@@ -248,7 +371,10 @@ def test_a_match_is_tried_again_and_failures_are_remembered(tmp_path: Path) -> N
     [record] = play(schedule, out, code=1)["records"]
     assert record["attempt"] == 3
     assert sorted(path.name for path in (out / "failed" / "Red-vs-Blue-1").iterdir()) == ["1", "2", "3"]
-    assert play(schedule, out, code=1)["played"] == 0
+    done = teamclone("play", schedule, "--out", out, code=1)
+    assert "0 played now" in done.stdout
+    assert "1 failed in an earlier call and was not tried again; with --retry-failed the same" in done.stdout
+    assert "listen on all addresses" not in done.stderr
     assert play(schedule, out, "--retry-failed", code=1)["played"] == 1
 
 
@@ -276,18 +402,24 @@ def test_the_quick_case_needs_no_schedule(tmp_path: Path) -> None:
     done = teamclone("play", "--left", red, "--right", blue, "-n", 2, *server, "--out", tmp_path / "out")
     assert "matches: 2 complete, 0 failed, 2 played now" in done.stdout
     assert "left : right" in done.stdout
+    assert done.stderr.count("the servers of matches listen on all addresses of this machine") == 1
     for wrong in (("--left", red), (tmp_path / "schedule.toml", "--left", red), ()):
         teamclone("play", *wrong, "--out", tmp_path / "out", code=2)
 
 
 def test_another_process_is_not_disturbed(tmp_path: Path) -> None:
     schedule = write_schedule(tmp_path, [("Red", "Blue")], half_time=300)
-    first = started(schedule, tmp_path / "out")
+    errors = tmp_path / "errors"
+    with errors.open("wb") as file:
+        first = started(schedule, tmp_path / "out", stderr=file)
     wait_for_match(tmp_path / "out")
     done = teamclone("play", schedule, "--out", tmp_path / "out", code=1)
     assert "another process plays into it" in done.stderr
     first.send_signal(signal.SIGINT)
-    assert first.wait(20) == 130
+    assert first.wait(60) == 130
+    ending, interrupted = errors.read_text().splitlines()[-2:]
+    assert ending == "teamclone: ending the matches that are being played; those that are over stay"
+    assert interrupted == "teamclone: interrupted, 0 of 1 matches are over; the same command plays the others"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
@@ -414,17 +546,30 @@ def test_mistakes_in_the_later_sections_are_told_before_anything_is_played(tmp_p
         ("[train]\npreset = 'small'\n", "[train] needs [dataset]"),
         ("[[dataset]]\nteams = 'Red'\n", "dataset: expected a table"),
         ("[teams.Green]\nname = 'Red'\ncommand = 'r'\n", "teams.Green.name: a team is called"),
-        ("[dataset]\nteams = 'Red'\n[train]\nset = ['train.epoch=1']\n", "did you mean train.epochs"),
+        (
+            "[dataset]\nteams = 'Red'\n[train]\nset = ['train.epoch=1', 'x']\n[evaluate]\ncheckpoint = 'best'\n[x]\n",
+            "schedule.toml: no section 'x'; choose from play, server, limits, teams, pairings, store, dataset, train, "
+            "evaluate; evaluate.checkpoint: no 'best'; did you mean best-loss?; train.set: expected KEY=VALUE, got 'x';"
+            " no setting 'train.epoch'; did you mean train.epochs",
+        ),
+        ("[dataset]\nteams = 'Red'\n[train]\npreset = 'smal'\n", "train.preset: no 'smal'; did you mean small?"),
         ("[store]\nplace = 'x'\n", "no setting store.place"),
-        ("[dataset]\nteams = 'Red'\ngoalkeepers = true\ntrain_goalkeepers = true\n", "leave out --train-goalkeepers"),
+        (
+            "[dataset]\nteams = 'Red'\ngoalkeepers = true\ntrain_goalkeepers = true\n",
+            "leave out dataset.train_goalkeepers",
+        ),
         (
             "[dataset]\nteams = 'Red'\nidle = true\n[train]\npreset = 'small'\n",
             'train.set: expected "model.commands=dash,turn,kick,tackle,none", as [dataset] has them',
         ),
     ):
         schedule = write_schedule(tmp_path, [("Red", "Blue")], more=more)
-        done = teamclone("pipeline", schedule, "--out", tmp_path / "out", code=2)
-        assert words in done.stderr
+        with pytest.raises(UsageError) as caught:
+            load_pipeline(schedule)
+        assert words in str(caught.value)
+        assert "--" not in str(caught.value)
+    done = teamclone("pipeline", schedule, "--out", tmp_path / "out", code=2)
+    assert words in done.stderr
     assert not (tmp_path / "out").exists()
 
 

@@ -29,6 +29,7 @@ def read_options() -> argparse.Namespace:
     parser.add_argument("--port", type=int, default=6000)
     parser.add_argument("--olcoach-port", type=int, help="play with a coach, who connects here")
     parser.add_argument("--unum", type=int, help="only this client: 1 the goalkeeper, 12 the coach")
+    parser.add_argument("--players", type=int, default=11, help="play with fewer than eleven")
     parser.add_argument("--coach", action="store_const", dest="unum", const=COACH, help="as --unum 12")
     parser.add_argument("--patience", type=float, default=5.0, help="seconds without a message before it gives up")
     faults = parser.add_argument_group("faults")
@@ -139,7 +140,7 @@ class Client:
 
 def play(options: argparse.Namespace) -> bool:
     """Plays until the server is gone; whether it was ever there."""
-    team = range(1, COACH + 1 if options.olcoach_port else COACH)
+    team = [*range(1, options.players + 1), *([COACH] if options.olcoach_port else [])]
     unums = team if options.unum is None else [options.unum]
     clients = {client.socket.fileno(): client for client in (Client(options, unum) for unum in unums)}
     poll = select.poll()

@@ -204,16 +204,19 @@ class Match:
             else:
                 self.connect_wait -= 1
             if self.kick_off_wait <= 0 or self.connect_wait <= 0:
-                side = "left" if self.half_time <= 0 or self.time // self.half_time % 2 == 0 else "right"
-                print(f"Kick_off_{side}", flush=True)
-                self.referee(f"kick_off_{side[0]}")
-                self.change_mode("play_on")
+                self.kick_off()
         elif self.mode == "play_on":
             self.wait_again()
         else:
             self.game_over_wait -= 1
             if self.game_over_wait <= 0:
                 self.over = "Game Over. Exiting..."
+
+    def kick_off(self) -> None:
+        side = "left" if self.half_time <= 0 or self.time // self.half_time % 2 == 0 else "right"
+        print(f"Kick_off_{side}", flush=True)
+        self.referee(f"kick_off_{side[0]}")
+        self.change_mode("play_on")
 
     def change_mode(self, mode: str) -> None:
         self.mode = mode

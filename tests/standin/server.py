@@ -172,6 +172,8 @@ class Server:
         if client.team is None:
             if text == "(dispbye)":
                 self.drop(client)
+            elif text == "(dispstart)" and self.match.mode == "before_kick_off":
+                self.match.kick_off()
             return
         self.log(client, text)
         for name, rest in COMMAND.findall(text):

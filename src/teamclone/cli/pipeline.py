@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from functools import wraps
 from pathlib import Path
@@ -25,7 +26,7 @@ def pipeline(
 ) -> None:
     """Play, store, make the dataset, train, evaluate and report. Finished parts are kept."""
     from teamclone.cli.common import print_json, print_table, progress, say, visible
-    from teamclone.cli.play import line_of
+    from teamclone.cli.play import ENDING, LISTENS, failed_before, line_of
     from teamclone.cli.train import reporter
     from teamclone.pipeline import Stage, Watch, load_pipeline, run_pipeline
     from teamclone.system.cluster import executor_of
@@ -33,8 +34,16 @@ def pipeline(
     asked = load_pipeline(schedule)
     with executor_of(scheduler, jobs=jobs) as executor, progress("pipeline") as bar:
         task = bar.add_task("", total=len(asked.schedule.fixtures))
+        warned = False
+
+        def tell(text: str) -> None:
+            bar.console.print(visible(text), markup=False, highlight=False, soft_wrap=True)
 
         def show(stage: Stage, done: int, total: int) -> None:
+            nonlocal warned
+            if stage is Stage.PLAY and done < total and not warned:
+                tell(LISTENS)
+                warned = True
             bar.update(task, description=stage, completed=done, total=total)
 
         report, stages = run_pipeline(
@@ -45,9 +54,8 @@ def pipeline(
             watch=Watch(
                 on_progress=show,
                 on_training=reporter(bar, task),
-                on_record=lambda record: bar.console.print(
-                    visible(line_of(record)), markup=False, highlight=False, soft_wrap=True
-                ),
+                on_record=lambda record: tell(line_of(record)),
+                on_stop=lambda: tell(ENDING),
             ),
         )
     if as_json:
@@ -67,6 +75,9 @@ def pipeline(
         )
         for record in report.failed:
             say(line_of(record))
+        if report.failed_before:
+            again = f"teamclone play {shlex.quote(str(schedule))} --out {shlex.quote(str(out))} --retry-failed"
+            say(f"{failed_before(report)}; try them again by {again}")
     if report.failed:
         raise typer.Exit(1)
 

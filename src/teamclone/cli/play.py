@@ -14,6 +14,11 @@ if TYPE_CHECKING:
 SHOWN = 20
 """Failed matches that are listed."""
 COUNTS = ("holes", "clashes", "missed")
+LISTENS = (
+    "teamclone: the servers of matches listen on all addresses of this machine; unshare -rn or a firewall closes them "
+    "(documentation: Play matches, The network)"
+)
+ENDING = "teamclone: ending the matches that are being played; those that are over stay"
 
 
 def play(
@@ -45,7 +50,7 @@ def play(
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> None:
     """Play matches on rcssserver, unattended. Given again, the command plays the missing ones."""
-    from teamclone.cli.common import print_json, progress, values_of, visible
+    from teamclone.cli.common import fail, print_json, progress, values_of, visible
     from teamclone.errors import UsageError
     from teamclone.play.runner import play as run
     from teamclone.play.schedule import load_schedule, quick_schedule
@@ -67,22 +72,35 @@ def play(
             left, right, matches=matches, server=server or "rcssserver", options=values_of(options or [])
         )
     with executor_of(scheduler, jobs=jobs) as executor, progress("play") as bar:
-        task = bar.add_task("", total=len(asked.fixtures))
+        total = len(asked.fixtures)
+        task = bar.add_task("", total=total)
+        warned = False
 
-        def show(record: Record) -> None:
-            count = f"{int(bar.tasks[task].completed) + 1} of {len(asked.fixtures)}"
-            bar.console.print(f"{count}: {visible(line_of(record))}", markup=False, highlight=False, soft_wrap=True)
+        def tell(text: str) -> None:
+            bar.console.print(visible(text), markup=False, highlight=False, soft_wrap=True)
 
-        report = run(
-            asked,
-            out,
-            store=None if store is None else create_store(store),
-            executor=executor,
-            jobs=jobs,
-            retry_failed=retry_failed,
-            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
-            on_record=show,
-        )
+        def count(done: int, total: int) -> None:
+            nonlocal warned
+            if done < total and not warned:
+                tell(LISTENS)
+                warned = True
+            bar.update(task, completed=done, total=total)
+
+        try:
+            report = run(
+                asked,
+                out,
+                store=None if store is None else create_store(store),
+                executor=executor,
+                jobs=jobs,
+                retry_failed=retry_failed,
+                on_progress=count,
+                on_record=lambda record: tell(f"{int(bar.tasks[task].completed) + 1} of {total}: {line_of(record)}"),
+                on_stop=lambda: tell(ENDING),
+            )
+        except KeyboardInterrupt:
+            done = int(bar.tasks[task].completed)
+            fail(f"interrupted, {done} of {total} matches are over; the same command plays the others", code=130)
     if as_json:
         print_json(report.to_json())
     else:
@@ -96,7 +114,10 @@ def line_of(record: Record) -> str:
     if record.trouble is not None:
         return f"{record.id}: failed after {record.attempt} attempts: {record.trouble.fault}: {record.trouble.text}"
     left, right = record.left, record.right
-    return f"{record.id}: {left.name} {left.score} : {right.score} {right.name}, {record.seconds:.0f} s"
+    started = {"left": left, "right": right}
+    lost = [side.team for name, side in started.items() if side.coach is False and f"{name}-coach" in record.commands]
+    coaches = f", without the coach of {' and of '.join(lost)}" if lost else ""
+    return f"{record.id}: {left.name} {left.score} : {right.score} {right.name}, {record.seconds:.0f} s{coaches}"
 
 
 def print_report(report: PlayReport) -> None:
@@ -133,6 +154,14 @@ def print_report(report: PlayReport) -> None:
         f"matches: {len(report.records) - len(failed)} complete, {len(failed)} failed, {report.played} played now; "
         f"{report.seconds:.1f} s{rate}"
     )
+    if report.failed_before:
+        print(f"{failed_before(report)}; with --retry-failed the same command tries them again")
+
+
+def failed_before(report: PlayReport) -> str:
+    """Return a sentence on the matches that were not tried again."""
+    number = report.failed_before
+    return f"{number} failed in an earlier call and {'was' if number == 1 else 'were'} not tried again"
 
 
 def _per_match(total: float, matches: list[Record]) -> str:

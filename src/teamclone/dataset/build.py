@@ -116,10 +116,28 @@ class DatasetConfig:
         Raises:
             UsageError: they do not.
         """
+        problems = self.problems()
+        if problems:
+            raise UsageError("; ".join(problems))
+
+    def problems(self, key: str | None = None) -> list[str]:
+        """Return what is wrong between the settings.
+
+        Args:
+            key: what messages call their table; None for options of the command line.
+        """
+
+        def called(name: str) -> str:
+            return f"{key}.{name}" if key else f"--{name.replace('_', '-')}"
+
+        training, every = called("train_goalkeepers"), called("goalkeepers")
+        problems = []
         if self.train_goalkeepers and self.split is SplitBy.ROWS:
-            raise UsageError("--train-goalkeepers keeps goalkeepers out of whole test matches; it needs --split match")
+            split = f"{called('split')} {'= ' if key else ''}match"
+            problems.append(f"{training} keeps goalkeepers out of whole test matches; it needs {split}")
         if self.train_goalkeepers and self.goalkeepers:
-            raise UsageError("--goalkeepers takes goalkeepers' commands in every split; leave out --train-goalkeepers")
+            problems.append(f"{every} takes goalkeepers' commands in every split; leave out {training}")
+        return problems
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

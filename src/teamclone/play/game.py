@@ -13,14 +13,15 @@ from pathlib import Path
 
 import psutil
 
+from teamclone.errors import PlayError
 from teamclone.play.ports import held_ports
 from teamclone.play.processes import MARK, end_all, start
 from teamclone.play.record import FailedError, Fault, who
 from teamclone.play.schedule import Fixture, TeamSpec, filled_in
-from teamclone.play.server import last_words, met_taken_port, server_environment, server_words
+from teamclone.play.server import coach_connected, last_words, met_taken_port, server_environment, server_words
 from teamclone.protocol.client import LOOPBACK, MonitorClient
 from teamclone.protocol.monitor import Show, load_reader
-from teamclone.rcss.players import N_TEAM
+from teamclone.rcss.playmodes import PlayMode
 
 SIDES = ("left", "right")
 LEAST_ROOM = 32 << 20
@@ -31,9 +32,13 @@ _LOOK_S = 2.0
 """Between two looks at a running match."""
 _GONE_S = 0.3
 """From the first player that is gone to the verdict, in case others follow."""
+_ASK_S = 1.0
+"""Between two requests to kick off."""
 _LEAVE_S = 1.0
 """How long teams may take to end by themselves after the server."""
 _SERVER_LOG = "server.txt"
+_FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Signals that say nothing about the program that they end."""
 
 
 class StoppedError(Exception):
@@ -60,7 +65,9 @@ class Game:
         self.port = 0
         self.show: Show | None = None
         self.seen: tuple[set[int], set[int]] = (set(), set())
-        self.heard_at = time.monotonic()
+        self.team_at = [0.0, 0.0]
+        self.awaited: dict[int, float] = {}  # by side, when a coach was started that is not there yet
+        self.began_at = self.heard_at = time.monotonic()
         self.gone_at: float | None = None
         self.kick_off_at: float | None = None
         self.end_at: float | None = None
@@ -137,7 +144,8 @@ class Game:
         if met_taken_port(words):
             raise FailedError(Fault.NO_PORT, last_words(words))
         if self.show is None:
-            raise FailedError(Fault.SERVER_START, f"the server {_ending(code)}: {last_words(words)}")
+            fault = Fault.SERVER_DIED if -code in _FROM_OUTSIDE else Fault.SERVER_START
+            raise FailedError(fault, f"the server {_ending(code)}: {last_words(words)}")
         if code != 0 or not kicked_off:
             raise FailedError(Fault.SERVER_DIED, f"the server {_ending(code)} before the end: {last_words(words)}")
         self.end_at = self.end_at or time.monotonic()
@@ -156,17 +164,19 @@ class Game:
             FailedError: the match failed.
             StoppedError: the match is no longer wanted.
         """
+        load_reader()
+        self.port = self.take_port()
+        self.began_at = time.monotonic()
         free = shutil.disk_usage(self.folder).free
         if free < LEAST_ROOM:
             text = f"{free / 1e6:.0f} MB are free, a match needs {LEAST_ROOM / 1e6:.0f} MB"
             raise FailedError(Fault.DISK_FULL, text)
-        load_reader()
-        self.port = self.take_port()
-        started = time.monotonic()
         self.start_server()
         with closing(MonitorClient(self.port)) as monitor:
             self.wait_for_server(monitor)
             self.bring_in_teams(monitor)
+            if not self.fixture.whole_teams:
+                self.kick_off(monitor)
             while not self.is_over():
                 # When a player is gone, wait to see which others are.
                 watching = self.kick_off_at is None or self.gone_at is not None
@@ -174,16 +184,20 @@ class Game:
                 self.look(monitor)
                 if self.kick_off_at is None:
                     self.check_clients()
-                if time.monotonic() - started > self.fixture.match_s:
+                self.check_coaches()
+                if time.monotonic() - self.began_at > self.fixture.match_s:
                     if self.end_at is not None:
-                        return
+                        break
                     raise FailedError(Fault.TOO_LONG, f"not over after {self.fixture.match_s:g} s")
+            self.check_coaches(ended=True)
 
     def take_port(self) -> int:
         """Take three ports in a row until the processes have ended; return the first."""
         while True:
             try:
                 port = self.held.enter_context(held_ports(any_block=self.fixture.takes_port))
+            except PlayError as error:
+                raise FailedError(Fault.NO_PORT, str(error)) from None
             except BlockingIOError:  # another match has the default, and will give it back
                 self.look(seconds=0.5)
                 continue
@@ -218,35 +232,61 @@ class Game:
 
     def bring_in_teams(self, monitor: MonitorClient) -> None:
         """Start one client after the other, so that each gets a known number; the left goalkeeper first."""
-        began = [0.0, 0.0]
         waiting = [team.clients() for team in self.teams]
         number = 0
         while any(waiting):
             number += 1
             for side in range(2):
                 if waiting[side]:
-                    began[side] = began[side] or time.monotonic()
+                    self.team_at[side] = self.team_at[side] or time.monotonic()
                     self.start_client(side, *waiting[side].pop(0))
                     if number == 1:
-                        self.wait_for_players(monitor, 1, side=side, began=began[side])
+                        self.wait_for_players(monitor, 1, side=side)
             for side in range(2):
                 if waiting[side]:
-                    self.wait_for_players(monitor, number, side=side, began=began[side])
+                    self.wait_for_players(monitor, number, side=side)
         for side in range(2):
-            self.wait_for_players(monitor, N_TEAM, side=side, began=began[side])
+            self.wait_for_players(monitor, self.teams[side].players, side=side)
 
-    def wait_for_players(self, monitor: MonitorClient, number: int, *, side: int, began: float) -> None:
+    def wait_for_players(self, monitor: MonitorClient, number: int, *, side: int) -> None:
         """Wait until so many players of a side have connected."""
         while len(self.seen[side]) < number:
             self.look(monitor)
             self.is_over(kicked_off=False)
             self.check_clients()
-            if time.monotonic() - began > self.fixture.limits.connect_s:
-                count = len(self.seen[side])
+            if time.monotonic() - self.team_at[side] > self.fixture.limits.connect_s:
+                count, team = len(self.seen[side]), self.teams[side]
                 text = (
-                    f"{self.teams[side].name}: {count} of {N_TEAM} players connected within "
+                    f"{team.name}: {count} of {team.players} players connected within "
                     f"{self.fixture.limits.connect_s:g} s{self.how_ended(side)}"
                 )
+                raise FailedError(Fault.NOT_CONNECTED, text, side=side)
+
+    def kick_off(self, monitor: MonitorClient) -> None:
+        """Have the server kick off as it would by itself if both teams had eleven players."""
+        ask_at = time.monotonic() + self.fixture.server.kick_off_wait_s
+        while self.show is not None and self.show.playmode == PlayMode.BEFORE_KICK_OFF:
+            if time.monotonic() > ask_at:
+                monitor.kick_off()
+                ask_at = time.monotonic() + _ASK_S
+            self.look(monitor)
+            self.is_over(kicked_off=False)
+            self.check_clients()
+
+    def check_coaches(self, *, ended: bool = False) -> None:
+        """Raise FailedError if a coach that the schedule names did not connect in time, or at all.
+
+        Args:
+            ended: True after the match, when none can connect any more.
+        """
+        for side, started in list(self.awaited.items()):
+            code = self.clients[side]["coach"].poll()
+            name = self.show.names[side] if self.show else None
+            if coach_connected(self.server_output(), name) is not False:
+                del self.awaited[side]
+            elif ended or code not in (None, 0) or time.monotonic() - started > self.fixture.limits.connect_s:
+                words = last_words((self.output / f"{SIDES[side]}-coach.txt").read_text("utf-8", "replace"))
+                text = f"{self.teams[side].name}: the coach never connected, it {_ending(code)}: {words}"
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)
 
     def check_clients(self) -> None:
@@ -273,6 +313,8 @@ class Game:
         words = filled_in(words, values)
         environment = dict(zip(team.environment, filled_in(list(team.environment.values()), values), strict=True))
         self.commands[f"{SIDES[side]}-{label}"] = words
+        if team.coach and label == "coach":
+            self.awaited[side] = time.monotonic()
         try:
             self.clients[side][label] = start(
                 words,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import getpass
+import os
 import socket
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from teamclone.system.files import held
+from teamclone.errors import PlayError
+from teamclone.system.files import lock
 
 DEFAULT_PORT = 6000
 """The server's default port for players; the trainer's is the next, the online coaches' the one after."""
@@ -27,15 +28,19 @@ def held_ports(*, any_block: bool) -> Iterator[int | None]:
 
     Raises:
         BlockingIOError: another match has the default port, and will give it back.
+        PlayError: see `open_locks`.
     """
-    folder = Path(tempfile.gettempdir()) / f"teamclone-ports-{getpass.getuser()}"
-    folder.mkdir(exist_ok=True)
     with ExitStack() as stack:
+        folder = open_locks()
+        stack.callback(os.close, folder)
         for port in range(DEFAULT_PORT + STEP, LAST_PORT, STEP) if any_block else (DEFAULT_PORT,):
-            lock = folder / str(port)
-            lock.touch()
             try:
-                stack.enter_context(held(lock))
+                handle = os.open(str(port), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600, dir_fd=folder)
+            except OSError:  # a link, perhaps
+                continue
+            stack.callback(os.close, handle)
+            try:
+                lock(handle)
             except BlockingIOError:
                 if not any_block:
                     raise
@@ -44,6 +49,46 @@ def held_ports(*, any_block: bool) -> Iterator[int | None]:
                 yield port
                 return
         yield None
+
+
+def default_is_held() -> bool:
+    """Return whether another match has the default port.
+
+    Raises:
+        PlayError: see `open_locks`.
+    """
+    try:
+        with held_ports(any_block=False):
+            return False
+    except BlockingIOError:
+        return True
+
+
+def open_locks() -> int:
+    """Open the folder of the locks, one for all matches of a user on this machine; return its descriptor.
+
+    It is in the folder for temporary files, where anybody may have made one of its name first and filled it with links.
+
+    Raises:
+        PlayError: it belongs to another user, or is no folder.
+    """
+    path = Path(tempfile.gettempdir()) / f"teamclone-ports-{os.getuid()}"
+    with suppress(FileExistsError):
+        path.mkdir(mode=0o700)
+    try:
+        folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError as error:
+        reason = error.strerror or str(error)
+    else:
+        if os.fstat(folder).st_uid == os.getuid():
+            os.fchmod(folder, 0o700)
+            return folder
+        os.close(folder)
+        reason = "one of another user"
+    raise PlayError(
+        f"{path}: expected a folder of your own, for the ports in use, got: {reason}; remove it, or set TMPDIR to a "
+        "folder that only you can write"
+    )
 
 
 def is_free(port: int) -> bool:

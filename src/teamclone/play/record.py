@@ -11,7 +11,6 @@ from typing import Any, Self
 
 from teamclone.errors import PlayError
 from teamclone.play.schedule import TeamSpec
-from teamclone.rcss.players import N_TEAM
 from teamclone.system.documents import check_format, read_json, write_document
 
 FORMAT = 2
@@ -54,7 +53,7 @@ class FailedError(Exception):
 def who(team: TeamSpec, unums: Iterable[int]) -> str:
     """Return players as the subject of a sentence, with its verb: ``Red: players 3, 4 are``."""
     numbers = sorted(unums)
-    if len(numbers) == N_TEAM:
+    if len(numbers) == team.players:
         return f"{team.name}: the whole team is"
     names = ", ".join(map(str, numbers))
     return f"{team.name}: player{'s' if len(numbers) > 1 else ''} {names} {'are' if len(numbers) > 1 else 'is'}"
@@ -89,6 +88,7 @@ class Side:
     Attributes:
         team: its name in the schedule.
         name: its name in the logs; None where it never connected.
+        coach: whether its online coach ever connected; None where the server does not report it (before version 15).
         score: goals.
         holes, clashes, missed: of players 1 to 11, see `holes`; None where there are no whole logs.
         files: SHA-256 of its programs, by path.
@@ -97,6 +97,7 @@ class Side:
 
     team: str
     name: str | None = None
+    coach: bool | None = None
     score: int = 0
     holes: tuple[int, ...] | None = None
     clashes: tuple[int, ...] | None = None

@@ -22,9 +22,11 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from teamclone.errors import PlayError, StoreError, UsageError
+from teamclone.play.ports import default_is_held, open_locks
 from teamclone.play.processes import kill_marked
 from teamclone.play.record import Fault, Record, Side, Trouble, bury_logs, load_record, save_record
 from teamclone.play.schedule import Fixture, Schedule
@@ -43,6 +45,12 @@ _POLL_S = 0.2
 _END_S = 30.0
 """How long a supervisor has to end its match."""
 
+_REMEDIES = {
+    Fault.DISK_FULL: "make room and give the command again",
+    Fault.SERVER_START: "mend the server or its options and give the command again",
+}
+"""Faults that every other match would have, too, and what to do; they are no attempt at a match."""
+
 OnRecord = Callable[[Record], None]
 """Called with the record of a match, as soon as it is known."""
 
@@ -54,11 +62,13 @@ class PlayReport:
     Attributes:
         records: of all matches, in the order of the schedule: the match, or the last attempt at it.
         played: how many were played now; the others were there before.
+        failed_before: how many failed in an earlier call and were not tried again.
         seconds: how long it took.
     """
 
     records: tuple[Record, ...]
     played: int
+    failed_before: int
     seconds: float
 
     @property
@@ -98,10 +108,12 @@ def play(
     retry_failed: bool = False,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_record: OnRecord = lambda record: None,
+    on_stop: Callable[[], None] = lambda: None,
 ) -> PlayReport:
     """Play the missing matches of a schedule.
 
     A match that failed is tried up to ``schedule.attempts`` times, then it counts as failed, also for the next call.
+    A server that does not start, or a full disk, ends this at once and counts as no attempt.
     When this ends, however it ends, servers and clients end with it.
 
     Args:
@@ -114,10 +126,12 @@ def play(
         retry_failed: forget the attempts at matches that failed before.
         on_progress: called with the number of matches that are complete or failed, and of all.
         on_record: called with the record of each match, as soon as it is known.
+        on_stop: called where this ends early, also by Ctrl-C, before the matches that run are ended.
 
     Raises:
         UsageError: ``out`` holds matches of another schedule, or a worker does not see it.
-        PlayError: there is no server, another process plays into ``out``, or the disk is full; matches played stay.
+        PlayError: there is no server or it does not start, another process plays into ``out``, the folder of the ports
+            is another user's, or the disk is full; matches played stay.
         StoreError: the store cannot be written.
         ClusterError: the connection to the executor's workers was lost.
     """
@@ -125,6 +139,7 @@ def play(
     out = out.resolve()
     if executor is None:
         find_server(schedule.fixtures[0].server)
+        os.close(open_locks())
     for folder in (out / MATCHES, out / FAILED):
         folder.mkdir(parents=True, exist_ok=True)
     lock = out / _LOCK
@@ -140,25 +155,32 @@ def play(
         records = _known_records(schedule, out)
         stored = _Stored(out, store)
         stored.add([record for record in records.values() if record.complete])
+        failed_before = sum(not record.complete for record in records.values())
         tasks = [
             _Task(fixture=fixture, attempts=schedule.attempts, out=out, wanted=wanted)
             for fixture in schedule.fixtures
             if fixture.id not in records
         ]
         on_progress(len(records), len(schedule.fixtures))
+        play_next: Callable[[_Task], Record] = _play_match
         if executor is None:
+            play_next = _Turns(tasks, wanted).play
             threads = jobs or max(1, available_cpus() // (1 if schedule.fixtures[0].server.synch else 2))
             executor = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="match"))
-        stop = partial(wanted.unlink, missing_ok=True)
-        stack.callback(stop)  # before the executor waits for its matches
-        for task, result in run_tasks(_play_match, tasks, executor=executor, on_stop=stop):
+        unwanted = partial(wanted.unlink, missing_ok=True)
+        stack.callback(unwanted)  # before the executor waits for its matches
+
+        def stop() -> None:
+            unwanted()
+            on_stop()
+
+        for task, result in run_tasks(play_next, tasks, executor=executor, on_stop=stop):
             record = _lost(task) if isinstance(result, Died) else result
-            records[task.fixture.id] = record
+            if record.trouble and record.trouble.fault in _REMEDIES:
+                fault, text = record.trouble.fault, record.trouble.text
+                raise PlayError(f"{fault} on {record.machine}: {text}; {_REMEDIES[fault]}, matches played stay")
+            records[record.id] = record
             on_record(record)
-            if record.trouble and record.trouble.fault is Fault.DISK_FULL:
-                raise PlayError(
-                    f"{out}: {record.trouble.text}; make room and give the command again, matches played stay"
-                )
             with suppress(StoreError):  # busy, perhaps: tried again with the next match, and at the end
                 stored.add([record] if record.complete else [])
             on_progress(len(records), len(schedule.fixtures))
@@ -166,6 +188,7 @@ def play(
     return PlayReport(
         records=tuple(records[fixture.id] for fixture in schedule.fixtures),
         played=len(tasks),
+        failed_before=failed_before,
         seconds=time.monotonic() - start,
     )
 
@@ -239,6 +262,44 @@ class _Stored:
         self._waiting = []
 
 
+class _Turns:
+    """The matches to play on this machine, each at the turn of a free slot.
+
+    Those that need the default ports follow one another, and hold no slot while they wait as long as there are others.
+    """
+
+    def __init__(self, tasks: Sequence[_Task], wanted: Path) -> None:
+        self._waiting = {task.fixture.id: task for task in tasks}
+        self._wanted = wanted
+        self._lock = Lock()
+        self._has_default = False
+
+    def play(self, _: _Task) -> Record:
+        """Play the match whose turn it is, which is not always the given one."""
+        task = self._next()
+        while task is None:
+            if not self._wanted.exists():
+                raise UsageError("the matches are no longer wanted")
+            time.sleep(_POLL_S)
+            task = self._next()
+        try:
+            return _play_match(task)
+        finally:
+            if not task.fixture.takes_port:
+                self._has_default = False
+
+    def _next(self) -> _Task | None:
+        """Take a match that can begin now; None where all that wait need the default ports, which are in use."""
+        with self._lock:
+            free = not self._has_default and not default_is_held()
+            able = (task for task in self._waiting.values() if free or task.fixture.takes_port)
+            task = next(able, None)
+            if task is not None:
+                del self._waiting[task.fixture.id]
+                self._has_default |= not task.fixture.takes_port
+            return task
+
+
 def _play_match(task: _Task) -> Record:
     """Play a match in as many attempts as it takes. Runs in a thread, here or on a worker of a cluster.
 
@@ -260,7 +321,7 @@ def _play_match(task: _Task) -> Record:
         folder = task.wanted.with_name(f"{task.fixture.id}.{uuid.uuid4().hex[:8]}")
         folder.mkdir()
         record = _attempt(Order(fixture=task.fixture, folder=folder, server=server, attempt=attempt), task.wanted)
-        if record.trouble and record.trouble.fault is Fault.DISK_FULL:
+        if record.trouble and record.trouble.fault in _REMEDIES:
             shutil.rmtree(folder, ignore_errors=True)
             break
         if record.complete:

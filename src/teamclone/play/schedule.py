@@ -10,7 +10,7 @@ import re
 import shlex
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,11 +50,14 @@ OTHER_SECTIONS = ("store", "dataset", "train", "evaluate")
 
 MAX_FIXTURES = 100_000
 
-_PLACEHOLDER = re.compile(r"(?<!\$)\{(\w*)\}")  # ${NAME} is for a shell
+CYCLES_PER_S = 20
+"""In synch mode a cycle before the kick-off takes at least 50 ms."""
+
+_PLACEHOLDER = re.compile(r"(?<!\$)\{([\w-]*)\}")  # ${NAME} is for a shell
 _VARIABLE = re.compile(r"[A-Za-z_]\w*")
 _WORD = re.compile(r"[\w./+-]*")
 """A value of an option that the server's parser accepts."""
-_NUMBERS = ("half_time", "nr_normal_halfs", "extra_half_time", "nr_extra_halfs", "simulator_step")
+_NUMBERS = ("half_time", "nr_normal_halfs", "extra_half_time", "nr_extra_halfs", "simulator_step", "kick_off_wait")
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
 
@@ -70,7 +73,9 @@ class TeamSpec:
         command: starts the whole team.
         start: a script by the league's rules, called with host, folder and number once for each client: 1 is the
             goalkeeper, 12 the coach.
-        player, goalie, coach: start one client. Without ``coach`` the team has none.
+        player, goalie, coach: start one client. Without ``coach`` the team has none, without ``goalie``, where it is
+            not whole, no goalkeeper.
+        players: how many it plays with.
         environment: variables to add.
     """
 
@@ -81,19 +86,22 @@ class TeamSpec:
     player: str = ""
     goalie: str = ""
     coach: str = ""
+    players: int = setting(N_TEAM, at_least=1, at_most=N_TEAM)
     environment: dict[str, str] = field(default_factory=dict)
 
     def clients(self) -> list[tuple[str, list[str]]]:
         """Return label and words of each process to start: goalkeeper, players, coach; or the one for all."""
         if self.command:
             return [("team", shlex.split(self.command))]
-        numbers = [("goalie", 1), *((f"player-{unum}", unum) for unum in range(2, N_TEAM + 1)), ("coach", COACH)]
+        first = "goalie" if self.start or self.goalie else "player-1"
+        others = range(2, self.players + 1)
+        numbers = [(first, 1), *((f"player-{unum}", unum) for unum in others), ("coach", COACH)]
         if self.start:
             words = [*shlex.split(self.start), "{host}", "{folder}", "{unum}"]
             return [(label, [word.replace("{unum}", str(unum)) for word in words]) for label, unum in numbers]
         made = []
         for label, unum in numbers:
-            text = {1: self.goalie, COACH: self.coach}.get(unum, self.player)
+            text = {1: self.goalie or self.player, COACH: self.coach}.get(unum, self.player)
             if text:
                 made.append((label, [word.replace("{unum}", str(unum)) for word in shlex.split(text)]))
         return made
@@ -130,13 +138,19 @@ class ServerSpec:
         shoot_out = 200 if self.options.get("server::penalty_shoot_outs") else 0
         return int(1000 * (regular + extra + shoot_out) / max(self.number("simulator_step"), 1))
 
+    @property
+    def kick_off_wait_s(self) -> float:
+        """Seconds that the server leaves between the last player's connection and the kick-off, at least."""
+        cycles = float(self.options.get("server::kick_off_wait", 100))
+        return cycles / CYCLES_PER_S if self.synch else cycles * self.number("simulator_step") / 1000
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """How long things may take, in seconds of wall time.
 
     Attributes:
-        connect_s: from the start of a team until all its players are connected.
+        connect_s: from the start of a team until all its players are connected, and from that of a coach until it is.
         stall_s: without a message of the server.
         match_s: a whole match; 0 is four times what it takes at 25 cycles/s, or in real time at 10, and a few minutes.
         silent_cycles: in a row without a command from a player on the field; the player then counts as hung. 0 is
@@ -171,6 +185,11 @@ class Fixture:
         return self.left.takes_port and self.right.takes_port
 
     @property
+    def whole_teams(self) -> bool:
+        """True if both teams have eleven players. Else the server does not kick off by itself."""
+        return self.left.players == self.right.players == N_TEAM
+
+    @property
     def match_s(self) -> float:
         """The longest that the match may take, in seconds."""
         if self.limits.match_s:
@@ -181,6 +200,9 @@ class Fixture:
     def fingerprint(self) -> str:
         """A hash that is equal for fixtures that ask for equal matches; limits do not count."""
         asked = [dataclasses.asdict(part) for part in (self.left, self.right, self.server)]
+        for team in asked[:2]:
+            if team["players"] == N_TEAM:  # matches of whole teams keep the hash that they had before there were others
+                del team["players"]
         return digest(json.dumps([asked, self.seed], sort_keys=True).encode())
 
     def to_json(self) -> dict[str, Any]:
@@ -252,13 +274,14 @@ def quick_schedule(left: str, right: str, *, matches: int, server: str, options:
     Raises:
         UsageError: naming all that is wrong, in one line.
     """
+    problems: list[str] = []
     teams = {}
     for side, text in (("left", left), ("right", right)):
         folder = Path(os.path.abspath(os.path.expanduser(text)))  # noqa: PTH100, PTH111 (any text)
         is_folder = os.path.isdir(folder)  # noqa: PTH112 (any text)
         script = folder / "start" if is_folder else folder
         if is_folder and not script.is_file():
-            raise UsageError(f"--{side} {text}: has no script called start; give the command that starts the team")
+            problems.append(f"--{side} {text}: has no script called start; give the command that starts the team")
         if script.name == "start" and script.is_file():
             name = script.parent.name
             team: dict[str, Any] = {"start": "./start", "folder": str(script.parent)}
@@ -271,16 +294,27 @@ def quick_schedule(left: str, right: str, *, matches: int, server: str, options:
         "teams": teams,
         "pairings": [{"left": first, "right": second, "matches": matches}],
     }
-    return schedule_from(table, where="teamclone play", base=Path.cwd())
+    return schedule_from(table, where="teamclone play", base=Path.cwd(), problems=problems)
 
 
-def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedule:
-    """Make a schedule of its tables; folders are relative to ``base``.
+def schedule_from(table: Mapping[str, Any], *, where: str, base: Path, problems: Iterable[str] = ()) -> Schedule:
+    """Make a schedule of its tables.
+
+    Args:
+        where: begins the message of an error. base: its folders are relative to it. problems: what else was wrong.
 
     Raises:
         UsageError: naming all that is wrong, in one line.
     """
-    problems: list[str] = []
+    found = list(problems)
+    schedule = schedule_of(table, base=base, problems=found)
+    if found:
+        raise UsageError(f"{where}: {'; '.join(dict.fromkeys(found))}")
+    return schedule
+
+
+def schedule_of(table: Mapping[str, Any], *, base: Path, problems: list[str]) -> Schedule:
+    """Make a schedule of its tables, whose folders are relative to ``base``; mistakes are appended to ``problems``."""
     known = ("play", "server", "limits", "teams", "pairings", *OTHER_SECTIONS)
     problems += [f"no section {name!r}; {choose(name, known)}" for name in table if name not in known]
     settings = from_table(PlaySettings, table.get("play", {}), "play", problems)
@@ -335,8 +369,6 @@ def schedule_from(table: Mapping[str, Any], *, where: str, base: Path) -> Schedu
         problems.append(f"play.seed: expected a number below 2^31, got {settings.seed}")
     twice = [name for name, number in Counter(fixture.id for fixture in fixtures).items() if number > 1]
     problems += [f"{name}: names two matches; call one of their teams otherwise" for name in twice]
-    if problems:
-        raise UsageError(f"{where}: {'; '.join(dict.fromkeys(problems))}")
     return Schedule(fixtures=tuple(fixtures), attempts=settings.attempts)
 
 
@@ -360,8 +392,8 @@ def _wrong(team: TeamSpec) -> list[str]:
     if len(ways) != 1:
         got = " and ".join(ways) or "none"
         problems.append(f"needs one of command (the whole team), start (the league's script) and player, got {got}")
-    if team.player and not team.goalie:
-        problems.append("player needs goalie, the command of the goalkeeper")
+    if team.player and not team.goalie and team.players == N_TEAM:
+        problems.append("player needs goalie, the command of the goalkeeper; only a team of fewer players has none")
     if not team.player and (team.goalie or team.coach):
         problems.append("goalie and coach go with player")
     for name in ("command", "start", "player", "goalie", "coach"):
@@ -370,7 +402,7 @@ def _wrong(team: TeamSpec) -> list[str]:
             words = shlex.split(text)
         except ValueError as error:
             problems.append(f"{name}: {text!r}: {error}")
-            return problems
+            continue
         strange = [found for word in words for found in _PLACEHOLDER.findall(word) if found not in PLACEHOLDERS]
         problems += [f"{name}: no {{{found}}}; {choose(found, PLACEHOLDERS)}" for found in strange]
         if "{unum}" in text and name in ("command", "start"):

@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from teamclone.errors import PlayError
-from teamclone.play.schedule import Fixture, ServerSpec, option_words
-
-CONNECT_CYCLES_PER_S = 20
-"""In synch mode a cycle before the kick-off takes at least 50 ms."""
+from teamclone.play.schedule import CYCLES_PER_S, Fixture, ServerSpec, option_words
 
 MAX_PROGRAMS = 64
 """Programs of a team of which hashes are kept, at most."""
 
 _VERSION = re.compile(r"rcssserver-([\w.]+)")
 _SEED = re.compile(r"Simulator Random Seed: (-?\d+)")
+_PLAYER = re.compile(r"^A new \(v[\d.]+\) player \(", re.MULTILINE)
+_COACH = re.compile(r"^A new \(v[\d.]+\) online coach \((\S+)\) connected", re.MULTILINE)
 _MISSED = "Someone missed a cycle"
 _GAVE_UP = "Waiting too long for clients"
 _NO_SOCKET = "Error initializing sockets"
@@ -44,7 +43,7 @@ def find_server(server: ServerSpec) -> Path:
 
 def server_words(program: Path, fixture: Fixture, *, port: int) -> list[str]:
     """Return the command that starts the server of a match; its logs go where it is started."""
-    wait = int(2 * CONNECT_CYCLES_PER_S * fixture.limits.connect_s) + 400  # we give up before the server does
+    wait = int(2 * CYCLES_PER_S * fixture.limits.connect_s) + 400  # we give up before the server does
     ours: dict[str, Any] = {
         "server::port": port,
         "server::coach_port": port + 1,
@@ -72,6 +71,17 @@ def server_report(output: str) -> dict[str, Any]:
         "random_seed": seed and int(seed[1]),
         "missed_cycles": output.count(_MISSED),
     }
+
+
+def coach_connected(output: str, name: str | None) -> bool | None:
+    """Return whether the online coach of a team has ever connected; None for servers that do not report connections.
+
+    Args:
+        name: of the team, as its players gave it to the server; None where none has come.
+    """
+    if not _PLAYER.search(output):
+        return None
+    return name in _COACH.findall(output)
 
 
 def gave_up(output: str) -> bool:

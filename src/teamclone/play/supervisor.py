@@ -15,7 +15,7 @@ import shutil
 import sys
 import time
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,7 +26,7 @@ from teamclone.play.holes import Holes
 from teamclone.play.processes import adopt_orphans
 from teamclone.play.record import FailedError, Fault, Record, Side, Trouble, bury_logs, save_record
 from teamclone.play.schedule import Fixture
-from teamclone.play.server import gave_up, hashes, programs_of, server_report
+from teamclone.play.server import coach_connected, gave_up, hashes, programs_of, server_report
 from teamclone.play.verdict import read_logs, verdict
 from teamclone.rcss.players import N_TEAM
 
@@ -35,6 +35,8 @@ STOPPED = 3
 
 FULL = 1 << 20
 """If fewer bytes than this can be written, a failure is attributed to the full disk."""
+
+_PERHAPS_FULL = (Fault.SERVER_START, Fault.SERVER_DIED, Fault.BAD_LOGS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +74,6 @@ def supervise(order: Order) -> Record:
     Raises:
         StoppedError: the match is no longer wanted.
     """
-    began, now = time.monotonic(), datetime.now(UTC)
     game = Game(order.fixture, folder=order.folder, program=order.server)
     failed: FailedError | None = None
     try:
@@ -86,16 +87,17 @@ def supervise(order: Order) -> Record:
     match, holes, problem = read_logs(order.folder)
     if failed is None:
         failed = verdict(order.fixture, match, holes, problem, gave_up=gave_up(game.server_output()))
-    if failed is not None and failed.fault in (Fault.SERVER_DIED, Fault.BAD_LOGS) and _is_full(order.folder):
+    if failed is not None and failed.fault in _PERHAPS_FULL and _is_full(order.folder):
         failed = FailedError(Fault.DISK_FULL, f"no room is left ({failed.text})")
     shutil.rmtree(order.folder / "conf", ignore_errors=True)
     if failed is not None:
         bury_logs(order.folder)
+    seconds, now = time.monotonic() - game.began_at, datetime.now(UTC)
     record = _record(order, game, failed=failed, match=match, holes=holes, exits=exits)
     return dataclasses.replace(
         record,
-        started=now.isoformat(timespec="seconds"),
-        seconds=round(time.monotonic() - began, 2),
+        started=(now - timedelta(seconds=seconds)).isoformat(timespec="seconds"),
+        seconds=round(seconds, 2),
         play_seconds=round(game.end_at - game.kick_off_at, 2) if game.end_at and game.kick_off_at else 0.0,
     )
 
@@ -114,6 +116,7 @@ def _record(
     sides = []
     for side, team in enumerate(game.teams):
         played = None if match is None else (match.left, match.right)[side]
+        name = played.name if played else game.show.names[side] if game.show else None
         mine = slice(side * N_TEAM, (side + 1) * N_TEAM)
         counts = {
             name: None if holes is None or failed else tuple(int(count) for count in getattr(holes, name)[mine])
@@ -123,7 +126,8 @@ def _record(
         sides.append(
             Side(
                 team=team.name,
-                name=played.name if played else game.show.names[side] if game.show else None,
+                name=name,
+                coach=coach_connected(output, name),
                 score=played.score if played else 0,
                 files=hashes(programs_of(Path(team.folder), commands)),
                 exits=exits[SIDES[side]],

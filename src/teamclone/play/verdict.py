@@ -57,7 +57,9 @@ def verdict(
         return FailedError(Fault.BAD_LOGS, f"the game log ends at cycle {last} of {cycles}")
     # Perhaps too shortly before the end to have been seen.
     running = (match.frames["playmode"] != PlayMode.TIME_OVER)[:, None]
-    gone = ((match.players["state"] == 0) & running).any(0)
+    counts = [fixture.left.players, fixture.right.players]
+    asked = np.tile(np.arange(N_TEAM), 2) < np.repeat(counts, N_TEAM)
+    gone = ((match.players["state"] == 0) & running).any(0) & asked
     least = fixture.limits.silent_cycles or len(running)
     return _blame(fixture, gone, Fault.CRASHED, "gone before the end") or _blame(
         fixture, holes.longest_silence >= least, Fault.HUNG, f"silent for {least} cycles and more"

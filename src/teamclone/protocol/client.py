@@ -59,6 +59,11 @@ class MonitorClient:
             self._ask_at = now + _ASK_S
         return show
 
+    def kick_off(self) -> None:
+        """Ask the server to kick off; it is not asked while it does not show the match."""
+        if self._served_at is not None:
+            self._send(monitor.kick_off(), self._served_at)
+
     def close(self) -> None:
         """Send the server a farewell and close the socket."""
         self._leave()

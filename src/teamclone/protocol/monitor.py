@@ -109,6 +109,11 @@ def bye() -> bytes:
     return b"(dispbye)\0"
 
 
+def kick_off() -> bytes:
+    """Make the request to kick off. The server obeys it while its clock stands at the beginning of a half."""
+    return b"(dispstart)\0"
+
+
 def place_player(side: Literal[1, -1], unum: int, *, x: float, y: float, body: float) -> bytes:
     """Make the request to put a player, standing, at a place. The server obeys it in every play mode.
 

@@ -40,18 +40,25 @@ def held(path: Path, *, busy: Exception | None = None) -> Iterator[None]:
     Raises:
         BlockingIOError: another process holds it; ``busy`` instead, where it is given.
     """
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl
-
     # Over NFS only a file that may be written can be locked.
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(handle)
         except BlockingIOError as error:
             raise busy or error from None
         yield
     finally:
         os.close(handle)
+
+
+def lock(handle: int) -> None:
+    """Lock an open file or folder until it is closed.
+
+    Raises:
+        BlockingIOError: another process holds it.
+    """
+    if sys.platform != "win32":
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -145,17 +145,20 @@ def preset_text(name: str) -> str:
     return (resources.files("teamclone.training") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load_config(preset: str = "best", overrides: Sequence[str] = ()) -> Config:
-    """Return a preset with single values overridden, each as ``section.key=value``.
+def load_config(preset: str = "best", overrides: Sequence[str] = (), *, where: str = "--set") -> Config:
+    """Return a preset with single values overridden, each as ``section.key=value``; see `override`.
 
     Raises:
         UsageError: naming all that is wrong, in one line.
     """
-    return override(config_from(tomllib.loads(preset_text(preset)), where=f"preset {preset}"), overrides)
+    return override(config_from(tomllib.loads(preset_text(preset)), where=f"preset {preset}"), overrides, where=where)
 
 
-def override(config: Config, overrides: Sequence[str]) -> Config:
-    """Return a config with single values replaced, each as ``section.key=value``; see `replaced`."""
+def override(config: Config, overrides: Sequence[str], *, where: str = "--set") -> Config:
+    """Return a config with single values replaced, each as ``section.key=value``; see `replaced`.
+
+    ``where`` begins the message of an error: the option or the setting that holds the values.
+    """
     problems: list[str] = []
     values: dict[str, Any] = {}
     for text in overrides:
@@ -165,7 +168,7 @@ def override(config: Config, overrides: Sequence[str]) -> Config:
             problems.append(str(error).removeprefix("--set: "))
         else:
             values[key] = value
-    return replaced(config, values, where="--set", problems=problems)
+    return replaced(config, values, where=where, problems=problems)
 
 
 def replaced(config: Config, values: Mapping[str, Any], *, where: str, problems: Iterable[str] = ()) -> Config:

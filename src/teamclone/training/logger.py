@@ -9,7 +9,7 @@ from teamclone.models.clone import Clone
 from teamclone.system.files import write_atomic
 from teamclone.training.checkpoint import save_progress, save_weights
 from teamclone.training.optimiser import Optimiser
-from teamclone.training.run import BEST, RESUME, Run
+from teamclone.training.run import BEST, LAST, RESUME, Run
 
 
 class RunLogger:
@@ -37,7 +37,7 @@ class RunLogger:
             before = [past[figure] for past in self.history if figure in past]
             if figure in record and all(better(float(record[figure]), float(value)) for value in before):
                 save_weights(run.checkpoint_path(name), model, epoch=epoch)
-        save_weights(run.checkpoint_path("last"), model, epoch=epoch)
+        save_weights(run.checkpoint_path(LAST), model, epoch=epoch)
         self.history.append(record)
         save_progress(run.checkpoint_path(RESUME), model, optimiser, epoch=epoch)
         for name, value in record.items():

@@ -44,6 +44,9 @@ FORMAT = 4
 RESUME = "resume"
 """The checkpoint that holds the optimiser too; not a model to load."""
 
+LAST = "last"
+"""The checkpoint of the last finished epoch."""
+
 BASE = "base"
 """The checkpoint from which an adapted run begins, its own copy; a model to load as any other."""
 

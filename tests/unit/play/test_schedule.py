@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from teamclone.errors import UsageError
-from teamclone.play.schedule import Fixture, filled_in, load_schedule, option_words, quick_schedule, schedule_from
+from teamclone.play.schedule import (
+    Fixture,
+    Limits,
+    ServerSpec,
+    TeamSpec,
+    filled_in,
+    load_schedule,
+    option_words,
+    quick_schedule,
+    schedule_from,
+)
 
 TEAMS = {
     "Red": {"command": "red --port {port}"},
@@ -98,7 +109,7 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
     table = {
         "teams": {
             "Red": {"command": "red", "start": "./start"},
-            "Blue": {"player": "p", "foldr": "x"},
+            "Blue": {"player": "p 'x", "coach": "c -p {olcoach-port}", "foldr": "x"},
             "Gray": {"command": "gray {prot}", "folder": "nowhere"},
             "Odd name": {"command": "sh -c 'unfinished"},
         },
@@ -118,6 +129,7 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
         "teams.Red: needs one of command (the whole team), start (the league's script) and player, got command and",
         "no setting teams.Blue.foldr; did you mean folder?",
         "teams.Blue: player needs goalie",
+        "No closing quotation; teams.Blue: coach: no {olcoach-port}; did you mean olcoach_port",
         "teams.Gray: command: no {prot}; did you mean port?",
         f"{tmp_path / 'nowhere'}: no such folder",
         "teams.Odd name: a name is made of",
@@ -244,3 +256,43 @@ def test_the_same_schedule_is_the_same_wherever_it_is_called_from(
 def test_a_folder_without_a_start_script_is_no_team(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="has no script called start"):
         quick_schedule("red", str(tmp_path), matches=1, server="srv", options={})
+
+
+def test_all_mistakes_of_the_quick_case_are_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as caught:
+        quick_schedule(str(tmp_path), str(tmp_path), matches=1, server="srv", options={"port": 1})
+    for part in ("--left /", "--right /", "server.options.port: is set by teamclone"):
+        assert part in str(caught.value)
+
+
+def test_a_team_may_have_fewer_players_and_then_needs_no_goalkeeper(tmp_path: Path) -> None:
+    teams = {
+        "Three": {"player": "p {unum} {port}", "coach": "c", "players": 3},
+        "League": {"start": "./start", "players": 2},
+        "Red": TEAMS["Red"],
+    }
+    table = {"teams": teams, "pairings": [{"left": "Three", "right": ["League", "Red"]}]}
+    first, second = schedule_from(table, where="schedule", base=tmp_path).fixtures
+    assert [label for label, _ in first.left.clients()] == ["player-1", "player-2", "player-3", "coach"]
+    assert first.left.clients()[0][1] == ["p", "1", "{port}"]
+    assert [label for label, _ in first.right.clients()] == ["goalie", "player-2", "coach"]
+    assert not first.whole_teams
+    assert not second.whole_teams
+    for players in (0, 12):
+        table["teams"] = {**teams, "Three": {**teams["Three"], "players": players}}
+        with pytest.raises(UsageError, match=r"teams\.Three\.players: expected at "):
+            schedule_from(table, where="schedule", base=tmp_path)
+
+
+def test_matches_of_whole_teams_keep_the_fingerprint_by_which_earlier_versions_know_them() -> None:
+    red, blue = TeamSpec(name="Red"), TeamSpec(name="Blue")
+    fixture = Fixture(id="Red-vs-Blue-1", left=red, right=blue, server=ServerSpec(), limits=Limits(), seed=0)
+    assert fixture.fingerprint == "f6b956948799d9d1"
+    assert replace(fixture, left=replace(red, players=5)).fingerprint != fixture.fingerprint
+
+
+def test_the_wait_before_a_kick_off_is_that_of_the_server() -> None:
+    synch = {"server::synch_mode": True}
+    assert ServerSpec(options=synch).kick_off_wait_s == 5
+    assert ServerSpec(options={**synch, "server::kick_off_wait": 10}).kick_off_wait_s == 0.5
+    assert ServerSpec(options={"server::kick_off_wait": 10}).kick_off_wait_s == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import socket
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +15,18 @@ from teamclone.errors import PlayError
 from teamclone.logs import read_match
 from teamclone.logs.match import Match
 from teamclone.play.holes import count_holes
-from teamclone.play.ports import DEFAULT_PORT, held_ports, is_free
+from teamclone.play.ports import DEFAULT_PORT, STEP, held_ports, is_free
 from teamclone.play.record import FORMAT, Fault, Record, Side, Trouble, load_record, save_record
 from teamclone.play.schedule import Fixture, Limits, ServerSpec, TeamSpec
-from teamclone.play.server import find_server, gave_up, last_words, met_taken_port, programs_of, server_report
+from teamclone.play.server import (
+    coach_connected,
+    find_server,
+    gave_up,
+    last_words,
+    met_taken_port,
+    programs_of,
+    server_report,
+)
 from teamclone.play.verdict import verdict
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.playmodes import PlayMode
@@ -36,6 +45,46 @@ def test_ports_that_are_in_use_are_passed_over() -> None:
         assert not is_free(first + 2)
         with held_ports(any_block=True) as third:
             assert third != first
+
+
+def test_the_folder_of_the_ports_is_never_one_that_somebody_else_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    target = tmp_path / "target"
+    target.mkdir()
+    folder = tmp_path / f"teamclone-ports-{os.getuid()}"
+    folder.symlink_to(target)
+    with pytest.raises(PlayError, match="expected a folder of your own"), held_ports(any_block=True):
+        pass
+    assert list(target.iterdir()) == []
+    folder.unlink()
+    with held_ports(any_block=True):
+        assert folder.stat().st_mode & 0o777 == 0o700
+    somebody = os.getuid() + 1
+    folder.rename(tmp_path / f"teamclone-ports-{somebody}")
+    monkeypatch.setattr("os.getuid", lambda: somebody)
+    with pytest.raises(PlayError, match="one of another user"), held_ports(any_block=True):
+        pass
+
+
+def test_a_link_among_the_ports_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    folder = tmp_path / f"teamclone-ports-{os.getuid()}"
+    folder.mkdir()
+    (folder / str(DEFAULT_PORT + STEP)).symlink_to(tmp_path / "created")
+    with held_ports(any_block=True) as port:
+        assert port is not None
+        assert port > DEFAULT_PORT + STEP
+    assert not (tmp_path / "created").exists()
+
+
+def test_the_server_tells_whether_a_coach_came() -> None:
+    came = "A new (v18) player (Red 1) connected.\nA new (v18) online coach (Red) connected.\n"
+    assert coach_connected(came, "Red") is True
+    assert coach_connected(f"{came}An online coach disconnected : (Blue)\n", "Blue") is False
+    assert coach_connected(came, None) is False
+    assert coach_connected("A new (v3) monitor connected\n", "Red") is None
 
 
 def test_holes_clashes_and_missed_cycles_are_those_put_into_a_match(samples_dir: Path) -> None:

@@ -173,4 +173,5 @@ def test_requests_are_what_the_server_reads() -> None:
     assert monitor.init() == b"(dispinit version 3)\0"
     assert monitor.init(5) == b"(dispinit version 5)\0"
     assert monitor.bye() == b"(dispbye)\0"
+    assert monitor.kick_off() == b"(dispstart)\0"
     assert monitor.place_player(-1, 7, x=-10.5, y=3.03, body=89.6) == b"(dispplayer -1 7 -168 48 90)\0"

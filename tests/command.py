@@ -10,7 +10,7 @@ TEAMCLONE = Path(sys.executable).with_name("teamclone")
 
 
 def teamclone(
-    *args: object, code: int = 0, cwd: Path | None = None, seconds: float = 240
+    *args: object, code: int = 0, cwd: Path | None = None, seconds: float = 1000
 ) -> subprocess.CompletedProcess[str]:
     """Runs a command and checks its exit code; what went wrong never comes as a traceback."""
     done = subprocess.run(

@@ -10,6 +10,7 @@ import typer
 if TYPE_CHECKING:
     from teamclone.play.record import Record
     from teamclone.play.runner import PlayReport
+    from teamclone.play.schedule import Schedule
 
 SHOWN = 20
 """Failed matches that are listed."""
@@ -50,27 +51,12 @@ def play(
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> None:
     """Play matches on rcssserver, unattended. Given again, the command plays the missing ones."""
-    from teamclone.cli.common import fail, print_json, progress, values_of, visible
-    from teamclone.errors import UsageError
+    from teamclone.cli.common import fail, print_json, progress, visible
     from teamclone.play.runner import play as run
-    from teamclone.play.schedule import load_schedule, quick_schedule
     from teamclone.store import create_store
     from teamclone.system.cluster import executor_of
 
-    if (schedule is None) == (left is None and right is None):
-        raise UsageError("give a schedule, or --left and --right")
-    if schedule is not None:
-        if server or options or matches != 1:
-            raise UsageError(
-                "--server, --set and --matches go with --left and --right; a schedule has these settings itself"
-            )
-        asked = load_schedule(schedule)
-    else:
-        if left is None or right is None:
-            raise UsageError("--left and --right need each other")
-        asked = quick_schedule(
-            left, right, matches=matches, server=server or "rcssserver", options=values_of(options or [])
-        )
+    asked = _asked(schedule, left, right, matches=matches, server=server, options=options or [])
     with executor_of(scheduler, jobs=jobs) as executor, progress("play") as bar:
         total = len(asked.fixtures)
         task = bar.add_task("", total=total)
@@ -107,6 +93,27 @@ def play(
         print_report(report)
     if report.failed:
         raise typer.Exit(1)
+
+
+def _asked(
+    schedule: Path | None, left: str | None, right: str | None, *, matches: int, server: str | None, options: list[str]
+) -> Schedule:
+    """Return the schedule that the options of the command ask for."""
+    from teamclone.cli.common import values_of
+    from teamclone.errors import UsageError
+    from teamclone.play.schedule import load_schedule, quick_schedule
+
+    if (schedule is None) == (left is None and right is None):
+        raise UsageError("give a schedule, or --left and --right")
+    if schedule is not None:
+        if server or options or matches != 1:
+            raise UsageError(
+                "--server, --set and --matches go with --left and --right; a schedule has these settings itself"
+            )
+        return load_schedule(schedule)
+    if left is None or right is None:
+        raise UsageError("--left and --right need each other")
+    return quick_schedule(left, right, matches=matches, server=server or "rcssserver", options=values_of(options))
 
 
 def line_of(record: Record) -> str:

@@ -183,7 +183,7 @@ class Game:
                 monitor.rest_s = 0.0 if watching else min(_LOOK_S, self.fixture.limits.stall_s / 4)
                 self.look(monitor)
                 if self.kick_off_at is None:
-                    self.check_clients()
+                    self.check_clients(monitor)
                 self.check_coaches()
                 if time.monotonic() - self.began_at > self.fixture.match_s:
                     if self.end_at is not None:
@@ -253,7 +253,7 @@ class Game:
         while len(self.seen[side]) < number:
             self.look(monitor)
             self.is_over(kicked_off=False)
-            self.check_clients()
+            self.check_clients(monitor)
             if time.monotonic() - self.team_at[side] > self.fixture.limits.connect_s:
                 count, team = len(self.seen[side]), self.teams[side]
                 text = (
@@ -263,15 +263,21 @@ class Game:
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)
 
     def kick_off(self, monitor: MonitorClient) -> None:
-        """Have the server kick off as it would by itself if both teams had eleven players."""
+        """Have the server kick off once the coaches are there, too; by itself it waits for eleven players a side."""
+        asked = False
         ask_at = time.monotonic() + self.fixture.server.kick_off_wait_s
         while self.show is not None and self.show.playmode == PlayMode.BEFORE_KICK_OFF:
-            if time.monotonic() > ask_at:
+            if any(self.clients[side]["coach"].poll() is None for side in self.awaited):
+                ask_at = max(ask_at, time.monotonic() + _POLL_S)
+            elif time.monotonic() > ask_at:
                 monitor.kick_off()
+                asked = True
                 ask_at = time.monotonic() + _ASK_S
             self.look(monitor)
-            self.is_over(kicked_off=False)
-            self.check_clients()
+            if self.is_over(kicked_off=asked):
+                return
+            self.check_clients(monitor)
+            self.check_coaches()
 
     def check_coaches(self, *, ended: bool = False) -> None:
         """Raise FailedError if a coach that the schedule names did not connect in time, or at all.
@@ -289,12 +295,15 @@ class Game:
                 text = f"{self.teams[side].name}: the coach never connected, it {_ending(code)}: {words}"
                 raise FailedError(Fault.NOT_CONNECTED, text, side=side)
 
-    def check_clients(self) -> None:
+    def check_clients(self, monitor: MonitorClient) -> None:
         """Raise FailedError if a process ended before the kick-off, unless it ended well, as scripts do."""
         for side in range(2):
             for label, client in self.clients[side].items():
                 code = client.poll()
                 if code not in (None, 0):
+                    self.look(monitor, seconds=0.0)  # the match may have begun before it ended
+                    if self.kick_off_at is not None:
+                        return
                     words = last_words((self.output / f"{SIDES[side]}-{label}.txt").read_text("utf-8", "replace"))
                     text = f"{self.teams[side].name}: {label} {_ending(code)} before the kick-off: {words}"
                     raise FailedError(Fault.TEAM_START, text, side=side)

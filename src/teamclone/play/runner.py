@@ -16,9 +16,9 @@ import sys
 import tempfile
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -140,14 +140,8 @@ def play(
     if executor is None:
         find_server(schedule.fixtures[0].server)
         os.close(open_locks())
-    for folder in (out / MATCHES, out / FAILED):
-        folder.mkdir(parents=True, exist_ok=True)
-    lock = out / _LOCK
-    lock.touch()
     with ExitStack() as stack:
-        stack.enter_context(held(lock, busy=PlayError(f"{out}: another process plays into it; wait for its end")))
-        _clear(out / _PLAYING)
-        stack.callback(_clear, out / _PLAYING)
+        stack.enter_context(_to_itself(out))
         wanted = _wanted(out)
         if retry_failed:
             for fixture in schedule.fixtures:
@@ -167,18 +161,10 @@ def play(
             play_next = _Turns(tasks, wanted).play
             threads = jobs or max(1, available_cpus() // (1 if schedule.fixtures[0].server.synch else 2))
             executor = stack.enter_context(ThreadPoolExecutor(threads, thread_name_prefix="match"))
-        unwanted = partial(wanted.unlink, missing_ok=True)
-        stack.callback(unwanted)  # before the executor waits for its matches
-
-        def stop() -> None:
-            unwanted()
-            on_stop()
-
-        for task, result in run_tasks(play_next, tasks, executor=executor, on_stop=stop):
+        stack.callback(wanted.unlink, missing_ok=True)  # before the executor waits for its matches
+        for task, result in run_tasks(play_next, tasks, executor=executor, on_stop=partial(_stop, wanted, on_stop)):
             record = _lost(task) if isinstance(result, Died) else result
-            if record.trouble and record.trouble.fault in _REMEDIES:
-                fault, text = record.trouble.fault, record.trouble.text
-                raise PlayError(f"{fault} on {record.machine}: {text}; {_REMEDIES[fault]}, matches played stay")
+            _stop_at(record)
             records[record.id] = record
             on_record(record)
             with suppress(StoreError):  # busy, perhaps: tried again with the next match, and at the end
@@ -191,6 +177,38 @@ def play(
         failed_before=failed_before,
         seconds=time.monotonic() - start,
     )
+
+
+@contextmanager
+def _to_itself(out: Path) -> Iterator[None]:
+    """Have the folder of the matches for this process, without what others left half played.
+
+    Raises:
+        PlayError: another process plays into it.
+    """
+    for folder in (out / MATCHES, out / FAILED):
+        folder.mkdir(parents=True, exist_ok=True)
+    lock = out / _LOCK
+    lock.touch()
+    with held(lock, busy=PlayError(f"{out}: another process plays into it; wait for its end")):
+        _clear(out / _PLAYING)
+        try:
+            yield
+        finally:
+            _clear(out / _PLAYING)
+
+
+def _stop(wanted: Path, on_stop: Callable[[], None]) -> None:
+    """Have the matches that run ended, and say so."""
+    wanted.unlink(missing_ok=True)
+    on_stop()
+
+
+def _stop_at(record: Record) -> None:
+    """Raise PlayError at a fault that every other match would have, too."""
+    if record.trouble and record.trouble.fault in _REMEDIES:
+        fault, text = record.trouble.fault, record.trouble.text
+        raise PlayError(f"{fault} on {record.machine}: {text}; {_REMEDIES[fault]}, matches played stay")
 
 
 def _clear(playing: Path) -> None:

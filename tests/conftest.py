@@ -38,9 +38,8 @@ def postgres() -> Iterator[Server]:
 
 
 def pytest_configure() -> None:
-    # Of the stand-in for rcssserver, see tests/standin: the interpreter that starts quickest, and less patience.
+    # Of the stand-in for rcssserver, see tests/standin: the interpreter that starts quickest.
     os.environ["STANDIN_PYTHON"] = sys.executable
-    os.environ["STANDIN_WAIT_MS"] = "200"
     # A shell that starts the tests in the background has them ignore Ctrl-C, and so every command that they start.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from command import teamclone
+from command import called
 
 SMALL = (
     "--set=model.hidden=[32]",
@@ -33,22 +33,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory, samples_dir: Path) -> Path:
 
 
 def test_from_the_logs_to_figures(folder: Path) -> None:
-    teamclone("ingest", folder / "logs", "--store", folder / "store")
-    assert teamclone("matches", "--store", folder / "store").stdout.count("recovered") == 4
+    called("ingest", folder / "logs", "--store", folder / "store")
+    assert called("matches", "--store", folder / "store").stdout.count("recovered") == 4
     options = ("dataset", "--store", folder / "store", "--team", "HELIOS_base", "--out")
-    said = teamclone(*options, folder / "dataset").stdout
+    said = called(*options, folder / "dataset").stdout
     assert "rows are recovered: they are what game logs imply" in said
-    teamclone("train", folder / "dataset", *SMALL, "--out", folder / "run")
-    found = json.loads(teamclone("evaluate", folder / "run", "--json").stdout)
+    called("train", folder / "dataset", *SMALL, "--out", folder / "run")
+    found = json.loads(called("evaluate", folder / "run", "--json").stdout)
     test = found["splits"]["test"]
     assert test["model"]["accuracy"]["value"] > 0.7
     assert "kick_direction" in test["parameters"]
-    teamclone("rollout", folder / "run", folder / "logs", "--starts", 2, "--samples", 2, "--horizon", 5)
+    called("rollout", folder / "run", folder / "logs", "--starts", 2, "--samples", 2, "--horizon", 5)
 
 
 def test_logged_commands_alone_are_not_there(folder: Path) -> None:
-    teamclone("ingest", folder / "logs", "--store", folder / "other")
-    said = teamclone(
+    called("ingest", folder / "logs", "--store", folder / "other")
+    said = called(
         *("dataset", "--store", folder / "other", "--team", "HELIOS_base", "--source", "logged"),
         *("--out", folder / "none"),
         code=1,

@@ -121,21 +121,17 @@ def test_holes_and_clashes_are_counted_for_each_player(tmp_path: Path) -> None:
 
 
 @both_servers
-@pytest.mark.parametrize(
-    ("options", "unums"), [("--crash-at 12", tuple(range(1, 12))), ("--crash-at 12 --crash-unum 7", (7,))]
-)
-def test_a_team_that_crashes_is_told_with_its_players(
-    tmp_path: Path, server: str, options: str, unums: tuple[int, ...]
-) -> None:
-    schedule = write_schedule(
-        tmp_path, [("Red", "Blue")], server=server, half_time=30, teams={"Blue": f"{TEAM} {options}"}
-    )
-    trouble = one(schedule, tmp_path / "out")
-    assert (trouble["fault"], trouble["side"]) == ("crashed", "right")
-    assert tuple(trouble["unums"]) == unums
-    assert trouble["cycle"] >= 12
-    [attempt] = (tmp_path / "out" / "failed" / "Red-vs-Blue-1").iterdir()
-    assert {path.suffix for path in attempt.glob("*rc*")} == {".failed"}
+def test_a_team_that_crashes_is_told_with_its_players(tmp_path: Path, server: str) -> None:
+    teams = {"All": f"{TEAM} --crash-at 12", "One": f"{TEAM} --crash-at 12 --crash-unum 7"}
+    schedule = write_schedule(tmp_path, [("Red", "All"), ("Red", "One")], server=server, half_time=30, teams=teams)
+    records = play(schedule, tmp_path / "out", code=1)["records"]
+    for record, unums in zip(records, (list(range(1, 12)), [7]), strict=True):
+        trouble = record["trouble"]
+        assert (trouble["fault"], trouble["side"]) == ("crashed", "right")
+        assert trouble["unums"] == unums
+        assert trouble["cycle"] >= 12
+        [attempt] = (tmp_path / "out" / "failed" / record["id"]).iterdir()
+        assert {path.suffix for path in attempt.glob("*rc*")} == {".failed"}
     assert not list((tmp_path / "out" / "matches").iterdir())
 
 
@@ -149,25 +145,31 @@ def test_a_team_that_never_comes_is_given_up(tmp_path: Path, server: str) -> Non
     assert "Late: 0 of 11 players connected within 1 s" in trouble["text"]
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("./no-such-program", "No such file or directory"),
-        ("sh -c 'echo wrong library; exit 127'", "team ended with code 127 before the kick-off: wrong library"),
-        ("sh -c 'kill -SEGV $$'", "team was ended by SIGSEGV before the kick-off"),
-    ],
-)
-def test_a_team_that_does_not_start_is_told_with_its_last_words(tmp_path: Path, command: str, words: str) -> None:
-    trouble = one(
-        write_schedule(tmp_path, [("Red", "Bad")], teams={"Bad": command.replace("'", '"')}), tmp_path / "out"
-    )
-    assert (trouble["fault"], trouble["side"]) == ("team did not start", "right")
-    assert words in trouble["text"]
+def test_a_team_that_does_not_start_is_told_with_its_last_words(tmp_path: Path) -> None:
+    teams = {
+        "Nothing": "./no-such-program",
+        "Library": 'sh -c "echo wrong library; exit 127"',
+        "Killed": 'sh -c "kill -SEGV $$"',
+    }
+    schedule = write_schedule(tmp_path, [("Red", name) for name in teams], teams=teams)
+    records = play(schedule, tmp_path / "out", code=1)["records"]
+    for record, words in zip(
+        records,
+        (
+            "No such file or directory",
+            "team ended with code 127 before the kick-off: wrong library",
+            "team was ended by SIGSEGV before the kick-off",
+        ),
+        strict=True,
+    ):
+        assert (record["trouble"]["fault"], record["trouble"]["side"]) == ("team did not start", "right")
+        assert words in record["trouble"]["text"]
 
 
 @both_servers
-def test_a_client_that_hangs_is_found(tmp_path: Path, server: str) -> None:
+def test_a_client_that_hangs_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, server: str) -> None:
     """In synchronous mode the server gives up on it, and the command log says who it was."""
+    monkeypatch.setenv("STANDIN_WAIT_MS", "200")
     schedule = write_schedule(
         tmp_path, [("Red", "Blue")], server=server, half_time=20, teams={"Red": f"{TEAM} --hang-at 30"}
     )
@@ -177,18 +179,18 @@ def test_a_client_that_hangs_is_found(tmp_path: Path, server: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("variable", "fault", "words"),
+    ("variable", "limits", "fault", "words"),
     [
-        ("STANDIN_DIE_AT", "server died", "the server was ended by SIGSEGV before the end"),
-        ("STANDIN_EXIT_EARLY_AT", "logs not whole", "the game log ends at cycle 15 of 40"),
-        ("STANDIN_HANG_AT", "server stalled", "nothing from the server for 2 s"),
+        ("STANDIN_DIE_AT", "", "server died", "the server was ended by SIGSEGV before the end"),
+        ("STANDIN_EXIT_EARLY_AT", "", "logs not whole", "the game log ends at cycle 15 of 40"),
+        ("STANDIN_HANG_AT", "stall_s = 3", "server stalled", "nothing from the server for 3 s"),
     ],
 )
 def test_a_server_that_ends_or_stalls_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, fault: str, words: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, limits: str, fault: str, words: str
 ) -> None:
     monkeypatch.setenv(variable, "15")
-    trouble = one(write_schedule(tmp_path, [("Red", "Blue")], limits="stall_s = 2"), tmp_path / "out")
+    trouble = one(write_schedule(tmp_path, [("Red", "Blue")], limits=limits), tmp_path / "out")
     assert (trouble["fault"], trouble["side"]) == (fault, None)
     assert words in trouble["text"]
 
@@ -254,12 +256,12 @@ def test_who_of_fewer_than_eleven_crashes_or_never_comes_is_told(tmp_path: Path)
         "Late": small_team(player=f"{CLIENT} --never-connect", players=3),
     }
     pairings = [("Red", "Crash"), ("Late", "Red")]
-    schedule = write_schedule(tmp_path, pairings, teams=teams, half_time=30, limits="connect_s = 2")
+    schedule = write_schedule(tmp_path, pairings, teams=teams, half_time=30, limits="connect_s = 6")
     crash, late = (record["trouble"] for record in play(schedule, tmp_path / "out", code=1)["records"])
     assert (crash["fault"], crash["side"], crash["unums"]) == ("crashed", "right", [1, 2])
     assert crash["text"].startswith("Crash: the whole team is gone")
     assert late["fault"] == "never connected"
-    assert "Late: 0 of 3 players connected within 2 s" in late["text"]
+    assert "Late: 0 of 3 players connected within 6 s" in late["text"]
 
 
 @both_servers
@@ -290,13 +292,13 @@ def test_a_match_that_waits_for_the_default_ports_holds_no_slot_and_does_not_cou
     schedule = write_schedule(tmp_path, [("Old", "Red"), ("Red", "Blue")], teams=teams)
     with held_default_ports():
         process = started(schedule, out, "-j", "1")
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 300
         while not (out / "matches" / "Red-vs-Blue-1").exists():
             assert process.poll() is None
             assert time.monotonic() < deadline, "the match that needs no default port does not end"
             time.sleep(0.1)
         released = time.time()
-    assert process.wait(60) == 0
+    assert process.wait(300) == 0
     names = ("Old-vs-Red-1", "Red-vs-Blue-1")
     waited, free = (json.loads((out / "matches" / name / NAME).read_text()) for name in names)
     assert waited["ports"] == [6000, 6001, 6002]
@@ -347,12 +349,19 @@ def test_a_default_port_that_a_stranger_has_is_told(tmp_path: Path) -> None:
     assert "teams without {port} in their commands need 6000" in trouble["text"]
 
 
-@pytest.mark.parametrize("habit", ["--refuse-to-die", "--fork", "--leave-children", "--refuse-to-die --fork"])
-@pytest.mark.parametrize("crash", [False, True])
-def test_nothing_stays_of_teams_with_bad_habits(tmp_path: Path, habit: str, crash: bool) -> None:
-    teams = {"Red": f"{TEAM} {habit}", "Blue": f"{TEAM} {'--crash-at 10' if crash else ''}"}
-    answer = play(write_schedule(tmp_path, [("Red", "Blue")], teams=teams), tmp_path / "out", code=int(crash))
-    assert answer["failed"] == int(crash)
+def test_nothing_stays_of_teams_with_bad_habits(tmp_path: Path) -> None:
+    habits = {
+        "Stays": "--refuse-to-die",
+        "Forks": "--fork",
+        "Parent": "--leave-children",
+        "Daemon": "--refuse-to-die --fork",
+    }
+    teams = {"Crash": f"{TEAM} --crash-at 10", **{name: f"{TEAM} {habit}" for name, habit in habits.items()}}
+    pairings = [(name, other) for name in habits for other in ("Blue", "Crash")]
+    schedule = write_schedule(tmp_path, pairings, teams=teams, half_time=10)
+    answer = play(schedule, tmp_path / "out", "-j", 4, code=1)
+    faults = [record["trouble"] and record["trouble"]["fault"] for record in answer["records"]]
+    assert faults == [None, "crashed"] * len(habits)
     assert strays(tmp_path) == []
 
 
@@ -410,7 +419,7 @@ def test_another_process_is_not_disturbed(tmp_path: Path) -> None:
     done = teamclone("play", schedule, "--out", tmp_path / "out", code=1)
     assert "another process plays into it" in done.stderr
     first.send_signal(signal.SIGINT)
-    assert first.wait(60) == 130
+    assert first.wait(300) == 130
     ending, interrupted = errors.read_text().splitlines()[-2:]
     assert ending == "teamclone: ending the matches that are being played; those that are over stay"
     assert interrupted == "teamclone: interrupted, 0 of 1 matches are over; the same command plays the others"
@@ -424,8 +433,8 @@ def test_whoever_ends_it_ends_its_processes(tmp_path: Path, number: signal.Signa
     process = started(schedule, tmp_path / "out", "-j", "2")
     wait_for_match(tmp_path / "out", number=2)
     process.send_signal(number)
-    assert process.wait(20) == (130 if number == signal.SIGINT else -number)
-    deadline = time.monotonic() + 15
+    assert process.wait(300) == (130 if number == signal.SIGINT else -number)
+    deadline = time.monotonic() + 300
     while strays(tmp_path) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert strays(tmp_path) == []
@@ -442,7 +451,7 @@ def test_a_killed_supervisor_costs_an_attempt(tmp_path: Path) -> None:
         child for child in psutil.Process(process.pid).children() if "teamclone.play.supervisor" in child.cmdline()
     ]
     supervisor.kill()
-    assert process.wait(100) == 0
+    assert process.wait(300) == 0
     record = json.loads((out / "matches" / "Red-vs-Blue-1" / NAME).read_text())
     assert (record["outcome"], record["attempt"]) == ("complete", 2)
     failed = json.loads((out / "failed" / "Red-vs-Blue-1" / "1" / NAME).read_text())
@@ -485,7 +494,7 @@ def check_six(out: Path, store: Path, answer: dict[str, Any]) -> None:
 @pytest.mark.slow
 def test_six_pairings_with_trouble_end_in_twelve_outcomes(tmp_path: Path, server: str) -> None:
     schedule = write_schedule(
-        tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2
+        tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 6", attempts=2
     )
     answer = play(schedule, tmp_path / "out", "-j", 2, "--ingest", tmp_path / "store", code=1)
     check_six(tmp_path / "out", tmp_path / "store", answer)
@@ -495,7 +504,7 @@ def test_six_pairings_with_trouble_end_in_twelve_outcomes(tmp_path: Path, server
 @pytest.mark.slow
 def test_the_same_after_five_kills_at_random(tmp_path: Path, server: str) -> None:
     schedule = write_schedule(
-        tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 3", attempts=2
+        tmp_path, SIX, server=server, matches=2, teams=TROUBLED, limits="connect_s = 6", attempts=2
     )
     out, store, chance = tmp_path / "out", tmp_path / "store", random.Random(5)
     for _ in range(5):
@@ -515,7 +524,7 @@ def test_a_whole_schedule_runs_and_what_is_there_is_kept(tmp_path: Path, server:
         "[train]\npreset = 'small'\nset = ['train.epochs=1', 'data.batches_per_epoch=2', 'data.batch_size=64']\n"
     )
     pairings = [("Red", "Blue"), ("Green", "Red")]
-    schedule = write_schedule(tmp_path, pairings, server=server, matches=5, more=more)
+    schedule = write_schedule(tmp_path, pairings, server=server, matches=3, more=more)
     out = tmp_path / "out"
 
     def stages() -> dict[str, bool]:
@@ -580,7 +589,7 @@ def test_the_former_name_of_pipeline_still_works_and_says_so(tmp_path: Path) -> 
 
 def wait_for_match(out: Path, *, number: int = 1, glob: str = ".playing/*/*/output/right-team.txt") -> None:
     """Until so many matches are being played, with all that belongs to them."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while len(list(out.glob(glob))) < number:
         assert time.monotonic() < deadline, "the matches do not begin"
         time.sleep(0.05)
@@ -593,8 +602,11 @@ def test_a_folder_may_be_called_as_one_likes(tmp_path: Path, server: str) -> Non
     assert play(schedule, tmp_path / "it's = a: folder")["complete"] == 1
 
 
-def test_a_server_that_waits_for_clients_after_the_end_has_played_the_match(tmp_path: Path) -> None:
+def test_a_server_that_waits_for_clients_after_the_end_has_played_the_match(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Clients may stop answering when all is over; the server then says that it waited too long."""
+    monkeypatch.setenv("STANDIN_WAIT_MS", "200")
     schedule = write_schedule(tmp_path, [("Red", "Blue")], teams={"Red": f"{TEAM} --hang-at 40"})
     schedule.write_text(schedule.read_text().replace("game_over_wait = 5", "game_over_wait = 100"))
     [record] = play(schedule, tmp_path / "out")["records"]
@@ -647,4 +659,4 @@ def test_ctrl_c_does_not_wait_for_a_supervisor_that_is_stuck(tmp_path: Path, mon
         supervisor.suspend()
         wanted.unlink()
         with pytest.raises(UsageError, match="no longer wanted"):
-            asked.result(20)
+            asked.result(300)

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import teamclone as tc
-from command import teamclone
+from command import called
 from teamclone.report.page import fresh_rollouts
 from teamclone.training.config import load_config
 
@@ -43,7 +43,7 @@ def run(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def rolled_out(*options: object) -> dict[str, Any]:
-    answer: dict[str, Any] = json.loads(teamclone("rollout", *options, "--json").stdout)
+    answer: dict[str, Any] = json.loads(called("rollout", *options, "--json").stdout)
     return answer
 
 
@@ -81,11 +81,11 @@ def test_its_files(run: Path, log: Path, tmp_path: Path) -> None:
 def test_the_report_shows_them(run: Path, log: Path, tmp_path: Path) -> None:
     shutil.copytree(run, tmp_path / "run")
     report = ("report", tmp_path / "run")
-    teamclone(*report)
+    called(*report)
     page = (tmp_path / "run" / "report.html").read_text()
     assert "Not played yet: <code>teamclone rollout" in page
     document = rolled_out(tmp_path / "run", log, *SIZE)
-    teamclone(*report)
+    called(*report)
     page = (tmp_path / "run" / "report.html").read_text()
     assert "Not played yet" not in page
     assert f"From {STARTS} moments of one match the clone plays its team on" in page
@@ -94,7 +94,7 @@ def test_the_report_shows_them(run: Path, log: Path, tmp_path: Path) -> None:
     # Those of other weights, and what somebody damaged, are not shown. A call that fails leaves them as they are.
     folder = tmp_path / "run" / "rollouts"
     whole = {name: (folder / name).read_text() for name in ("rollouts.json", "fans.json")}
-    failed = teamclone("rollout", tmp_path / "run", log, *SIZE, "--from-cycle", 99999, code=1)
+    failed = called("rollout", tmp_path / "run", log, *SIZE, "--from-cycle", 99999, code=1)
     assert "no play_on goes on from cycle 99999" in failed.stderr
     assert {name: (folder / name).read_text() for name in whole} == whole
     opened = tc.load(tmp_path / "run").run
@@ -141,7 +141,7 @@ def test_the_other_team(run: Path, log: Path, tmp_path: Path, others: str) -> No
 def test_one_bad_log_stops_nothing(run: Path, log: Path, fixtures_dir: Path, tmp_path: Path) -> None:
     old = next((fixtures_dir / "native-v1").glob("*.rcg.gz"))
     other = next((fixtures_dir / "goalie3").glob("*.rcg.gz"))
-    done = teamclone("rollout", run, old, other, log, *SIZE, "--out", tmp_path, code=1)
+    done = called("rollout", run, old, other, log, *SIZE, "--out", tmp_path, code=1)
     assert "players: clone, samples" in done.stdout
     [line] = done.stderr.splitlines()
     assert f"{old}: expected a log that lists the server's parameters" in line
@@ -165,7 +165,7 @@ def test_a_folder_of_game_logs_alone(run: Path, log: Path, tmp_path: Path) -> No
 def test_a_log_without_player_types(run: Path, log: Path, tmp_path: Path) -> None:
     lines = lzma.decompress(log.read_bytes()).splitlines(keepends=True)
     (tmp_path / "bare.rcg").write_bytes(b"".join(line for line in lines if not line.startswith(b"(player_type ")))
-    done = teamclone("rollout", run, tmp_path / "bare.rcg", *SIZE, "--out", tmp_path / "out", code=1)
+    done = called("rollout", run, tmp_path / "bare.rcg", *SIZE, "--out", tmp_path / "out", code=1)
     assert "expected a log that lists player types, got one without" in done.stderr
 
 
@@ -179,4 +179,4 @@ def test_a_log_without_player_types(run: Path, log: Path, tmp_path: Path) -> Non
     ],
 )
 def test_wrong_usage(run: Path, log: Path, options: tuple[object, ...], expected: str) -> None:
-    assert expected in teamclone("rollout", run, log, *options, code=2).stderr
+    assert expected in called("rollout", run, log, *options, code=2).stderr

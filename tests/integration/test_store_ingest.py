@@ -269,7 +269,7 @@ def start(samples: Path, store: Path) -> subprocess.Popen[str]:
     )
 
 
-def wait_for(condition: Callable[[], object], what: str, seconds: float = 60) -> None:
+def wait_for(condition: Callable[[], object], what: str, seconds: float = 300) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, f"no {what} after {seconds} s"
@@ -330,7 +330,7 @@ def test_an_ingest_that_is_stopped_can_go_on(samples_dir: Path, tmp_path: Path, 
             os.killpg(process.pid, signal.SIGINT)
         else:
             os.kill(workers(process.pid)[0], signal.SIGKILL)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=300)
     finally:
         process.kill()
     assert "Traceback" not in err
@@ -391,7 +391,7 @@ def test_two_ingests_at_once(samples_dir: Path, tmp_path: Path) -> None:
     try:
         wait_for(lambda: first.poll() is not None or (root / ".lock").exists(), "lock")
         second = teamclone("ingest", samples_dir, "--store", root, code=1)
-        out, err = first.communicate(timeout=100)
+        out, err = first.communicate(timeout=300)
     finally:
         first.kill()
     assert "another ingest is writing to this store" in second.stderr

@@ -52,7 +52,7 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     )
 
 
-def wait_for(condition: Callable[[], object], what: str, seconds: float = 60) -> None:
+def wait_for(condition: Callable[[], object], what: str, seconds: float = 300) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, f"no {what} after {seconds} s"
@@ -127,7 +127,7 @@ def test_two_ingests_at_once(url: str, samples: Path, reference: Store) -> None:
     both = [start("ingest", samples, "--store", url, "--jobs", 1, "--json") for _ in range(2)]
     reports = []
     for process in both:
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=300)
         assert process.returncode == 0, err
         reports.append(json.loads(out))
     for report in reports:  # what came in since its start, by whomever
@@ -146,7 +146,7 @@ def test_an_ingest_that_is_killed_leaves_nothing_half(
         wait_for(lambda: copies_commands(postgres, name), "copy of commands")
     finally:
         process.send_signal(signal.SIGKILL)
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
     store = open_store(url)
     before = store.match_ids()
     assert len(before) < N_MATCHES
@@ -175,7 +175,7 @@ def test_a_server_may_restart_in_the_middle(own_server: Server, samples: Path, r
     try:
         wait_for(lambda: copies_commands(own_server, name), "copy of commands")
         own_server.restart(away_s=0.5)
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=300)
     finally:
         process.kill()
         process.communicate()

@@ -56,7 +56,7 @@ def torchrun(dataset: Path, out: Path, *options: str) -> subprocess.CompletedPro
 
 
 def started(script: tuple[str, ...]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run((*LAUNCHER, *script), capture_output=True, text=True, timeout=200, check=False)
+    return subprocess.run((*LAUNCHER, *script), capture_output=True, text=True, timeout=1000, check=False)
 
 
 def sets(*more: str) -> list[str]:

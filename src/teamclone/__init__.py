@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from teamclone.evaluation.evaluate import evaluate
     from teamclone.evaluation.prediction_table import PredictionTable
     from teamclone.logs import Match, find_matches, read_match
+    from teamclone.replay.page import make_replay
     from teamclone.report.page import make_report
     from teamclone.store.ingest import ingest
     from teamclone.store.opening import create_store, open_store
@@ -59,6 +60,7 @@ _HOME = {
     "PredictionTable": "evaluation.prediction_table",
     "evaluate": "evaluation.evaluate",
     "make_report": "report.page",
+    "make_replay": "replay.page",
     "TeamcloneError": "errors",
 }
 """The module of each public name, in the order of the pipeline."""
@@ -83,6 +85,7 @@ __all__ = [
     "ingest",
     "load",
     "load_config",
+    "make_replay",
     "make_report",
     "open_dataset",
     "open_run",

@@ -6,12 +6,10 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from teamclone.errors import StoreError, UsageError
-from teamclone.evaluation.prediction_table import MatchColumns, PredictionTable, predict_match
+from teamclone.errors import UsageError
+from teamclone.evaluation.match_columns import MatchColumns
+from teamclone.evaluation.prediction_table import PredictionTable, predict_match
 from teamclone.logs import Match, read_match
-from teamclone.logs.columns import Source
-from teamclone.rcss.player_types import FIELDS
-from teamclone.store.postgres.location import masked
 from teamclone.training.run import Run, open_run
 
 if TYPE_CHECKING:
@@ -95,18 +93,4 @@ def _columns(match: Match | Path | str, store: Store | None) -> MatchColumns:
         return MatchColumns.of(match if isinstance(match, Match) else read_match(match))
     if isinstance(match, Match):
         raise UsageError("expected the id of a match of the store, got a match; leave out the store")
-    row = next((row for row in store.matches().to_pylist() if row["match_id"] == match), None)
-    if row is None:
-        raise StoreError(f"{masked(store.location)}: no match {match}; see `teamclone matches`")
-    tables = {name: store.read_match_columns(str(match), name) for name in ("frames", "player_states", "commands")}
-    return MatchColumns(
-        match_id=str(match),
-        left=row["left_name"],
-        right=row["right_name"],
-        frames=tables["frames"],
-        players=tables["player_states"],
-        commands=tables["commands"],
-        source=Source(int(tables["commands"]["source"].max(initial=Source.LOGGED))),
-        types=store.read_match_columns(str(match), "player_types", columns=FIELDS),
-        params=store.read_parameters(str(match))["server"],
-    )
+    return MatchColumns.of_store(store, str(match))

@@ -36,13 +36,14 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "models": (*BASE, "dynamics", "world", "planner", "engine"),
     "training": (*BASE, "world", "dataset", "models"),
     "search": (*BASE, "plots", "dataset", "models", "training"),
-    "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "dataset", "models", "training"),
+    "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "store", "dataset", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
+    "replay": (*BASE, "plots", "logs", "dynamics", "store", "training", "evaluation", "rollouts"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "models", "training", "search", "evaluation", "pipeline"),
-    "cli": (*READING, *CLONING, "rollouts", "report", "pipeline", "api"),
-    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "api"),
+    "cli": (*READING, *CLONING, "rollouts", "report", "replay", "pipeline", "api"),
+    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "replay", "api"),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""

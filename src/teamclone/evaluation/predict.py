@@ -53,7 +53,7 @@ def predict(
     parameters = np.empty((n, n_parameters), np.float32)
     log_loss = np.empty(n, np.float32)
     for part, answer in answers(model, n, inputs_of, target_of=lambda part: dataset.target(rows[part]), batch=batch):
-        probabilities[part], parameters[part], log_loss[part] = answer
+        probabilities[part], parameters[part], log_loss[part], _ = answer
         if on_batch is not None:
             on_batch(part.stop - part.start)
     kind, issued, last = truth(dataset, rows)

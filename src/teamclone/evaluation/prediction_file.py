@@ -15,7 +15,8 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from teamclone.errors import TeamcloneError, UsageError
-from teamclone.evaluation.prediction_table import MatchColumns, PredictionTable, predict_match
+from teamclone.evaluation.match_columns import MatchColumns
+from teamclone.evaluation.prediction_table import PredictionTable, predict_match
 from teamclone.logs import read_match
 
 if TYPE_CHECKING:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +14,10 @@ from torch import Tensor
 
 from teamclone.dataset.clean import COMMAND_COLUMNS, Commands, clean_match, players_to_model
 from teamclone.dynamics import formulas
-from teamclone.dynamics.inverse.columns import recovered_commands
-from teamclone.errors import DatasetError, TeamcloneError, UsageError, choose
+from teamclone.errors import DatasetError, TeamcloneError
 from teamclone.evaluation.answers import Answers, answers
+from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.logs.columns import INTERVALS, Source
-from teamclone.logs.match import Columns, Match
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.playmodes import PlayMode
@@ -36,70 +34,6 @@ _ROUNDING_M = 1e-3
 """How much further from the ball than a kick or tackle reaches they are still predicted."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatchColumns:
-    """The columns of a match that a prediction needs, from its logs or from a store.
-
-    Attributes:
-        match_id: of the match. left, right: names of the teams, None for an empty side.
-        frames, players, commands: columns of the match, see ``teamclone.logs.columns``.
-        source: of the commands; recovered ones have ``columns.INTERVALS``, too.
-        types: the columns of ``player_types.FIELDS``. params: the server's parameters.
-    """
-
-    match_id: str
-    left: str | None
-    right: str | None
-    frames: Columns
-    players: Columns
-    commands: Columns
-    types: Columns
-    params: Mapping[str, float | str]
-    source: Source = Source.LOGGED
-
-    @classmethod
-    def of(cls, match: Match) -> MatchColumns:
-        """Return the columns of a match that was read from its logs; without a command log, its recovered commands."""
-        game, commands, source = match.game, match.commands, Source.LOGGED
-        if match.log is None:
-            with suppress(UsageError):  # then there are none
-                commands, _ = recovered_commands(
-                    game.frames, game.players, types=game.player_types, params=game.server_params
-                )
-                source = Source.RECOVERED
-        return cls(
-            match_id=match.match_id,
-            left=match.left.name,
-            right=match.right.name,
-            frames=match.frames,
-            players=match.players,
-            commands=commands,
-            source=source,
-            types=match.game.player_types,
-            params=match.game.server_params,
-        )
-
-    def side_of(self, team: str | None, side: str | None) -> int:
-        """Return the side that ``team`` or ``side`` names, 1 left or -1 right.
-
-        Raises:
-            UsageError: neither or both are named, or the team does not play.
-        """
-        sides = {"left": 1, "right": -1}
-        if (team is None) == (side is None):
-            raise UsageError(f"match {self.match_id}: name either a team ({self.left}, {self.right}) or a side")
-        if side is not None:
-            if side not in sides:
-                raise UsageError(f"expected the side left or right, got {side!r}")
-            return sides[side]
-        names = [name for name in (self.left, self.right) if name]
-        if team not in names:
-            raise UsageError(f"match {self.match_id}: no team {team!r}; {choose(str(team), names)}")
-        if self.left == self.right:
-            raise UsageError(f"match {self.match_id}: both teams are called {team!r}; name a side instead")
-        return 1 if team == self.left else -1
-
-
 class PredictionTable:
     """Predictions for the players of a team, one row a player and frame, in the order of frames, then numbers.
 
@@ -110,7 +44,8 @@ class PredictionTable:
     none is known that the model knows; ``source``, whether a command log has it (``logged``) or the game log alone
     implies it (``recovered``); ``executed``, whether the server carried it out; ``done_dash_power``, ... its
     parameters; ``log_loss`` of the command, nats; ``parameter_log_loss``, -ln of the density of its parameters, null
-    for a model that has none.
+    for a model that has none. On request ``dash_power_spread``, ... of the likeliest command: half of the draws of its
+    parameters lie within this of the likeliest.
     """
 
     def __init__(self, table: pa.Table) -> None:
@@ -161,6 +96,7 @@ def predict_match(
     side: int,
     unums: Collection[int] | None = None,
     goalkeepers: bool = False,
+    draws: int = 0,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> PredictionTable:
     """Predict every command of a team in a match, also where none was given.
@@ -174,6 +110,7 @@ def predict_match(
         side: of the team, 1 left or -1 right.
         unums: uniform numbers to predict, 1 to 11; None for all.
         goalkeepers: predict goalkeepers of a model without catch, too.
+        draws: with how many draws the spread of the likeliest command's parameters is found; 0 leaves its columns out.
         on_progress: called with the rows done and their number.
 
     Raises:
@@ -204,14 +141,17 @@ def predict_match(
     parameters = parameters_of(commands)
     probabilities = np.empty((len(frame), len(commands)), np.float32)
     likeliest = np.empty((len(frame), len(parameters)), np.float32)
-    parameter_log_loss = np.empty(len(frame), np.float32)
-    found = answers(model, len(frame), state_of, target_of=target_of, kicks_of=kicks_of)
+    parameter_log_loss, spread = np.empty(len(frame), np.float32), np.empty_like(likeliest)
+    found = answers(model, len(frame), state_of, target_of=target_of, kicks_of=kicks_of, draws=draws)
     for part, answer in found:
-        probabilities[part], likeliest[part], parameter_log_loss[part] = answer
+        probabilities[part], likeliest[part], parameter_log_loss[part], spread[part] = answer
         if on_progress is not None:
             on_progress(part.stop, len(frame))
-    answer = Answers(probabilities, likeliest, parameter_log_loss)
+    answer = Answers(probabilities, likeliest, parameter_log_loss, spread)
     table = _table(match, frame, actor, answer, done, asked=near | done.with_ball, side=side, commands=commands)
+    if draws:
+        for column, of in enumerate(parameters):
+            table = table.append_column(f"{of.name}_spread", _or_null(spread[:, column]))
     return PredictionTable(table)
 
 
@@ -237,7 +177,7 @@ def _table(
     commands: tuple[str, ...],
 ) -> pa.Table:
     """Return the columns of `PredictionTable`; ``asked`` (n,): kicks and tackles were predicted there."""
-    probabilities, likeliest, parameter_log_loss = answer
+    probabilities, likeliest, parameter_log_loss, spread = answer
     parameters = parameters_of(commands)
     unknown = done.kind < 0
     parameter_log_loss[unknown | np.isnan(done.issued).all(1)] = np.nan
@@ -245,7 +185,7 @@ def _table(
         log_loss = -np.log(np.take_along_axis(probabilities, done.kind.clip(min=0)[:, None], 1)[:, 0])
     for column, parameter in enumerate(parameters):
         if parameter.kind.name in {"KICK", "TACKLE"}:
-            likeliest[~asked, column] = np.nan
+            likeliest[~asked, column] = spread[~asked, column] = np.nan
     names = np.array(commands)
     team, cycle = match.left if side > 0 else match.right, match.frames
     columns: dict[str, Any] = {

@@ -1,8 +1,9 @@
-"""One theme for every figure: fonts, lines and spines; colours are the caller's, because pages and files differ."""
+"""One theme for every figure and page. Colours of a figure are the caller's, because pages and files differ."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import resources
 from typing import Any
 
 
@@ -55,3 +56,8 @@ def style(colours: Colours) -> Any:
         "lines.linewidth": 1.6,
         "lines.solid_capstyle": "round",
     }
+
+
+def theme_css() -> str:
+    """Return the colours of every page as CSS variables of its root."""
+    return resources.files(__package__).joinpath("theme.css").read_text("utf-8")

@@ -19,6 +19,7 @@ from teamclone.evaluation.evaluate import evaluate_and_save, load_evaluation
 from teamclone.evaluation.latency import load_bench, measure_run
 from teamclone.models.clone import model_id
 from teamclone.models.config import EgocentricPointConfig, PaperConfig
+from teamclone.plots.style import theme_css
 from teamclone.report import figures
 from teamclone.rollouts.files import load_rollouts
 from teamclone.rollouts.run import MOVERS
@@ -456,7 +457,7 @@ def render(
         figures=FIGURES,
         percents=PERCENT,
         kinds=tuple(section["commands"]),
-        colours=figures.KIND_COLOURS,
+        theme=Markup(theme_css()),
         even_log_loss=metrics.even_log_loss(tuple(section["commands"])),
         support=support,
         sentences=sentences(evaluation),

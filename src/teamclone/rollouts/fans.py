@@ -30,9 +30,15 @@ def fans_of(matches: Sequence[MatchRollouts]) -> list[dict[str, Any]]:
     return [_fan(match, int(start)) for match, start in order[:MOST]]
 
 
+def shown_cycles(ahead: int) -> NDArray[np.int64]:
+    """Return how many cycles ahead the points of a fan's paths are, (n,)."""
+    cycles: NDArray[np.int64] = np.unique(np.linspace(0, ahead, POINTS).round().astype(int))
+    return cycles
+
+
 def _fan(match: MatchRollouts, start: int) -> dict[str, Any]:
     ahead = int(min(match.reach[start], match.truth.shape[1] - 1))
-    shown = np.unique(np.linspace(0, ahead, POINTS).round().astype(int))
+    shown = shown_cycles(ahead)
     own = np.append(match.own[start], True)
     there = match.on_field[start]
     return {

@@ -18,7 +18,7 @@ from teamclone.dynamics.inverse.recover import recover
 from teamclone.dynamics.logged import Logged
 from teamclone.dynamics.rules import Rules
 from teamclone.errors import TeamcloneError, UsageError
-from teamclone.evaluation.prediction_table import MatchColumns
+from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.logs import read_match
 from teamclone.logs.align import plays_on
 from teamclone.rcss.commands import CommandKind

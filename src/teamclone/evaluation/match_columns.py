@@ -1,0 +1,102 @@
+"""The columns of a match that whatever looks at one match needs, from its logs or from a store. Needs no PyTorch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+
+from teamclone.dynamics.inverse.columns import recovered_commands
+from teamclone.errors import StoreError, UsageError, choose
+from teamclone.logs.columns import Source
+from teamclone.logs.match import Columns, Match
+from teamclone.rcss.player_types import FIELDS
+from teamclone.store.postgres.location import masked
+from teamclone.store.store import Store
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchColumns:
+    """The columns of a match that a prediction needs, from its logs or from a store.
+
+    Attributes:
+        match_id: of the match. left, right: names of the teams, None for an empty side.
+        frames, players, commands: columns of the match, see ``teamclone.logs.columns``.
+        source: of the commands; recovered ones have ``columns.INTERVALS``, too.
+        types: the columns of ``player_types.FIELDS``. params: the server's parameters.
+    """
+
+    match_id: str
+    left: str | None
+    right: str | None
+    frames: Columns
+    players: Columns
+    commands: Columns
+    types: Columns
+    params: Mapping[str, float | str]
+    source: Source = Source.LOGGED
+
+    @classmethod
+    def of(cls, match: Match) -> MatchColumns:
+        """Return the columns of a match that was read from its logs; without a command log, its recovered commands."""
+        game, commands, source = match.game, match.commands, Source.LOGGED
+        if match.log is None:
+            with suppress(UsageError):  # then there are none
+                commands, _ = recovered_commands(
+                    game.frames, game.players, types=game.player_types, params=game.server_params
+                )
+                source = Source.RECOVERED
+        return cls(
+            match_id=match.match_id,
+            left=match.left.name,
+            right=match.right.name,
+            frames=match.frames,
+            players=match.players,
+            commands=commands,
+            source=source,
+            types=match.game.player_types,
+            params=match.game.server_params,
+        )
+
+    @classmethod
+    def of_store(cls, store: Store, match_id: str) -> MatchColumns:
+        """Return the columns of a match of a store.
+
+        Raises:
+            StoreError: the store has no such match, or its rows cannot be read.
+        """
+        row = next((row for row in store.matches().to_pylist() if row["match_id"] == match_id), None)
+        if row is None:
+            raise StoreError(f"{masked(store.location)}: no match {match_id}; see `teamclone matches`")
+        tables = {name: store.read_match_columns(match_id, name) for name in ("frames", "player_states", "commands")}
+        return cls(
+            match_id=match_id,
+            left=row["left_name"],
+            right=row["right_name"],
+            frames=tables["frames"],
+            players=tables["player_states"],
+            commands=tables["commands"],
+            source=Source(int(tables["commands"]["source"].max(initial=Source.LOGGED))),
+            types=store.read_match_columns(match_id, "player_types", columns=FIELDS),
+            params=store.read_parameters(match_id)["server"],
+        )
+
+    def side_of(self, team: str | None, side: str | None) -> int:
+        """Return the side that ``team`` or ``side`` names, 1 left or -1 right.
+
+        Raises:
+            UsageError: neither or both are named, or the team does not play.
+        """
+        sides = {"left": 1, "right": -1}
+        if (team is None) == (side is None):
+            raise UsageError(f"match {self.match_id}: name either a team ({self.left}, {self.right}) or a side")
+        if side is not None:
+            if side not in sides:
+                raise UsageError(f"expected the side left or right, got {side!r}")
+            return sides[side]
+        names = [name for name in (self.left, self.right) if name]
+        if team not in names:
+            raise UsageError(f"match {self.match_id}: no team {team!r}; {choose(str(team), names)}")
+        if self.left == self.right:
+            raise UsageError(f"match {self.match_id}: both teams are called {team!r}; name a side instead")
+        return 1 if team == self.left else -1

@@ -56,7 +56,7 @@ class Event:
     Attributes:
         frame: index of the frame. kind: what it is.
         side: of the team, 1 left, -1 right, 0 of none. unum: of the player, 0 where none or not known.
-        text: what happened, without the names of the teams.
+        text: what there is to say beside the kind, without the names of the teams; may be empty.
     """
 
     frame: int
@@ -130,7 +130,7 @@ def _rises(there: NDArray[np.bool_], *, lasting: bool = True) -> NDArray[np.bool
 
 
 def _of_touches(found: list[Touch]) -> Iterator[Event]:
-    words = {EventKind.KICK: "kick", EventKind.CATCH: "catch", EventKind.TACKLE: "tackle, gets the ball"}
+    words = {EventKind.KICK: "", EventKind.CATCH: "", EventKind.TACKLE: "gets the ball"}
     for touch in found:
         yield Event(frame=touch.frame, kind=touch.kind, side=touch.side, unum=touch.unum, text=words[touch.kind])
 
@@ -138,7 +138,7 @@ def _of_touches(found: list[Touch]) -> Iterator[Event]:
 def _failed_tackles(state: NDArray[np.uint32]) -> Iterator[Event]:
     for frame, slot in np.argwhere(_rises((state & state_bits.TACKLE_FAULT) != 0)):
         side, unum = int(SLOT_SIDES[slot]), int(SLOT_UNUMS[slot])
-        yield Event(frame=int(frame), kind=EventKind.TACKLE, side=side, unum=unum, text="tackle, misses the ball")
+        yield Event(frame=int(frame), kind=EventKind.TACKLE, side=side, unum=unum, text="misses the ball")
 
 
 def _turnovers(frames: Columns, found: list[Touch]) -> Iterator[Event]:
@@ -178,7 +178,7 @@ def _shots(frames: Columns, found: list[Touch], params: Mapping[str, float | str
         rolls = formulas.roll(np.inf, decay) * decay
         passes, away = abs(y[after] + cycles * vy), np.hypot(to_line, y[after])
         if cycles <= rolls and passes <= mouth + SHOT_MARGIN_M and away <= SHOT_RANGE_M:
-            text = f"shot from {away:.0f} m, {'on target' if passes <= mouth else 'wide'}"
+            text = f"from {away:.0f} m, {'on target' if passes <= mouth else 'wide'}"
             yield Event(frame=touch.frame, kind=EventKind.SHOT, side=touch.side, unum=touch.unum, text=text)
 
 
@@ -218,7 +218,7 @@ def _goal(frames: Columns, frame: int, side: int, found: list[Touch]) -> Event:
     own = last is not None and last.side != side
     ours = next((touch for touch in reversed(found) if touch.frame < frame and touch.side == side), None)
     unum = ours.unum if ours is not None and not own else 0
-    text = f"goal, {score}" + (f", last touched by {last.unum} of the other team" if own and last is not None else "")
+    text = score + (f", last touched by {last.unum} of the other team" if own and last is not None else "")
     return Event(frame=frame, kind=EventKind.GOAL, side=side, unum=unum, text=text)
 
 
@@ -228,8 +228,8 @@ def _of_players(players: Columns) -> Iterator[Event]:
     there = (state & state_bits.STAND) != 0
     changed = (types[1:] != types[:-1]) & there[1:] & there[:-1]
     for kind, text, rises in (
-        (EventKind.CARD, "yellow card", _rises((state & state_bits.YELLOW_CARD) != 0)),
-        (EventKind.CARD, "red card", _rises((state & state_bits.RED_CARD) != 0)),
+        (EventKind.CARD, "yellow", _rises((state & state_bits.YELLOW_CARD) != 0)),
+        (EventKind.CARD, "red", _rises((state & state_bits.RED_CARD) != 0)),
         (EventKind.PLAYER, "leaves the field", _rises(~there)),
         (EventKind.PLAYER, "comes onto the field", _rises(there)),
         (EventKind.PLAYER, "changes to type {}", changed),

@@ -30,7 +30,7 @@ from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.replay.channels import of_commands, of_match
-from teamclone.replay.events import EventKind, find_events
+from teamclone.replay.events import Event, EventKind, find_events
 from teamclone.replay.fans import STEP_M, read_fans
 from teamclone.replay.jasmin import write_jasmin
 from teamclone.replay.payload import packed
@@ -128,14 +128,14 @@ def make_replay(
 
         expected = predicted(open_run(Path(run)), columns, teams=teams, checkpoint=checkpoint, on_progress=on_progress)
     fans = [] if rollouts is None else read_fans(Path(rollouts), columns)
-    page, notes = _page(columns, expected, fans, says)
+    events = find_events(columns.frames, columns.players, columns.params)
+    page, notes = _page(columns, expected, fans=fans, events=events, says=says)
     path = Path(out)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, page)
     if jasmin is not None:
         write_jasmin(Path(jasmin), columns)
-    found = find_events(columns.frames, columns.players, columns.params)
-    counts = Counter(event.kind.value for event in found)
+    counts = Counter(event.kind.value for event in events)
     return Replay(
         path=path,
         size=len(page),
@@ -170,7 +170,7 @@ def _says(columns: MatchColumns, text_of: Callable[[int], str]) -> Says:
 
 
 def _page(
-    match: MatchColumns, expected: Predictions, fans: list[dict[str, Any]], says: Says
+    match: MatchColumns, expected: Predictions, *, fans: list[dict[str, Any]], events: Sequence[Event], says: Says
 ) -> tuple[bytes, tuple[str, ...]]:
     """Return the page and the notes on it."""
     channels = [
@@ -179,7 +179,7 @@ def _page(
         *expected.channels,
     ]
     notes = [*expected.notes, *_notes(match, {channel.name for channel in channels})]
-    head = _head(match, expected, fans)
+    head = _head(match, expected, fans=fans, events=events)
     page = _assembled(packed({**head, "says": says, "notes": notes}, channels))
     if len(page) > MOST_BYTES and says[0]:
         notes.append("What players said is left out: with it the page would be larger than 3 MB.")
@@ -202,7 +202,9 @@ def _notes(match: MatchColumns, channels: set[str]) -> list[str]:
     return notes
 
 
-def _head(match: MatchColumns, expected: Predictions, fans: list[dict[str, Any]]) -> dict[str, Any]:
+def _head(
+    match: MatchColumns, expected: Predictions, *, fans: list[dict[str, Any]], events: Sequence[Event]
+) -> dict[str, Any]:
     """Return what the page knows of the match beside its channels."""
 
     def parameter(name: str) -> float:
@@ -223,7 +225,7 @@ def _head(match: MatchColumns, expected: Predictions, fans: list[dict[str, Any]]
         },
         "types": {name: [round(float(value), 5) for value in match.types[name]] for name in FIELDS},
         "kinds": [kind.value for kind in EventKind],
-        "events": [list(asdict(event).values()) for event in find_events(match.frames, match.players, match.params)],
+        "events": [list(asdict(event).values()) for event in events],
         "predictions": expected.about if expected.of else None,
         "fans": {"step": STEP_M, "of": fans},
     }

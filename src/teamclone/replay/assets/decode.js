@@ -2,7 +2,7 @@
 
 /** Return {head, columns}; a column is {data, rows, step, none}, its numbers row by row. */
 export async function decode(base64) {
-  const packed = Uint8Array.from(atob(base64), (one) => one.charCodeAt(0));
+  const packed = Uint8Array.fromBase64?.(base64) ?? Uint8Array.from(atob(base64), (one) => one.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   const length = new DataView(bytes.buffer).getUint32(0, true);
@@ -26,7 +26,7 @@ function numbers(bytes, column, frames) {
     const plane = bytes.subarray(place * count, (place + 1) * count);
     for (let i = 0; i < count; i++) data[i] |= plane[i] << (8 * place);
   }
-  const mask = column.bytes === 4 ? -1 : (1 << (8 * column.bytes)) - 1;
+  const mask = column.bytes === 4 ? -1 : (1 << (8 * column.bytes)) - 1; // of what is unsigned for now
   for (let i = 0; i < count; i++) {
     const folded = data[i] & mask;
     data[i] = (folded >>> 1) ^ -(folded & 1);

@@ -21,7 +21,7 @@ export function chip(slot) {
 }
 
 /** A probability in words. */
-export const percent = (p) => (p > 0 && p < 0.01 ? "under 1 %" : `${Math.round(100 * p)} %`);
+export const percent = (p) => (p > 0 && p < 0.01 ? "under 1\u00a0%" : `${Math.round(100 * p)}\u00a0%`);
 
 /** The commands of some players that the clone expected least, as events. */
 export function surprises(match, slots) {
@@ -40,7 +40,7 @@ export function surprises(match, slots) {
   return peaks(greatest).map((frame) => {
     const slot = whose[frame];
     const { answered, likeliest, loss } = match.expected(slot, frame);
-    const text = `${answered.word}, expected with ${percent(Math.exp(-loss))}; ${likeliest.word} with ${percent(likeliest.p)}`;
+    const text = `${answered.word} (${percent(Math.exp(-loss))} expected), not ${likeliest.word} (${percent(likeliest.p)})`;
     return { frame, kind: SURPRISE, side: slot < 11 ? 1 : -1, unum: (slot % 11) + 1, text };
   });
 }
@@ -107,7 +107,7 @@ export class EventList {
     const { match } = this;
     const team = event.side ? match.teamName(event.side > 0 ? 0 : 1) : "";
     const short = event.side && event.unum ? `${event.side > 0 ? "l" : "r"}${event.unum}` : "";
-    return `${match.cycle(event.frame)} ${event.kind} ${team} ${short} ${event.text} ${match.mode(event.frame)}`.toLowerCase();
+    return `${match.cycle(event.frame)} ${event.kind} ${team} ${short} ${event.text}`.toLowerCase();
   }
 
   render() {
@@ -135,7 +135,7 @@ export class EventList {
     const button = element("button");
     button.type = "button";
     const what = element("span", "what");
-    what.append(element("b", "", event.kind), ` ${event.text === event.kind ? "" : event.text}`);
+    what.append(element("b", "", event.kind), ` ${event.text}`);
     const slot = event.side ? (event.side > 0 ? 0 : 11) + Math.max(0, event.unum - 1) : null;
     const who = slot === null ? element("span", "chip none", "–") : chip(slot);
     if (slot !== null && !event.unum) who.textContent = "·";

@@ -15,12 +15,13 @@ import { LinkWriter, readLink } from "./link.js";
 import { listKeys, watchKeys } from "./keys.js";
 
 const PANEL_MS = 90; // between two drawings of the panel while time runs
+const DIGITS_MS = 700; // in which two digits are one number
 const byId = (id) => document.getElementById(id);
 
 /** What may be shown or hidden: name, key, text, at first, and whether the match has it. */
 const SWITCHES = [
   ["arrows", "a", "commands of the chosen player", true, (match) => match.has("kind") || match.predictions],
-  ["all", "shift+a", "predicted commands of all players", false, (match) => match.predictions],
+  ["all", "shift+a", "commands of all players", false, (match) => match.has("kind") || match.predictions],
   ["wrong", "w", "mark wrong predictions", true, (match) => match.predictions],
   ["fans", "u", "futures of roll-outs", true, (match) => match.fans.length],
   ["trail", "b", "trail of the ball", true, () => true],
@@ -146,16 +147,15 @@ class Replay {
         [[key], "", () => this.jump(kind, 1)],
         [[`shift+${key}`], "", () => this.jump(kind, -1)],
       ]),
-      [["1", "…", "9", "0", "-"], "player 1 to 11 of the team last chosen", () => {}],
-      ...[..."1234567890-"].map((key, i) => [[key], "", () => this.choose(this.match.team(this.view.chosen ?? this.lastChosen ?? 0) * 11 + i)]),
+      [["1", "…", "10", "11"], "player of the team last chosen", () => {}],
+      ...[..."1234567890"].map((key) => [[key], "", () => this.digit(Number(key))]),
       [["q"], "the same number of the other team", () => this.choose(((this.view.chosen ?? this.lastChosen ?? 0) + 11) % PLAYERS)],
       [["Escape"], "choose nobody, see the whole pitch", () => this.whole()],
       [["f"], "follow ball, player, nothing", () => this.nextFollow()],
-      [["+", "−"], "zoom in, out", () => {}],
+      [["+", "-"], "zoom in, out", () => {}],
       [["+"], "", () => this.zoom(1.5)],
       [["="], "", () => this.zoom(1.5)],
-      [["_"], "", () => this.zoom(1 / 1.5)],
-      [["−"], "", () => this.zoom(1 / 1.5)],
+      [["-"], "", () => this.zoom(1 / 1.5)],
       [["z"], "whole pitch", () => this.setFollow("none")],
       ...SWITCHES.filter(([name]) => byId("switches").querySelector(`[data-name=${name}]`)).map(([name, key, text]) => [[key], text, () => this.toggle(name)]),
       [["d"], "day or night colours", () => this.colours.toggle()],
@@ -178,6 +178,16 @@ class Replay {
     this.events.setExtra([...this.found, ...futures(this.match)]);
     this.regraph();
     this.changed();
+  }
+
+  /** Choose by number: 1, then 0 or 1 at once is 10 or 11. */
+  digit(digit) {
+    const now = performance.now();
+    const second = this.digitBefore === 1 && digit <= 1 && now - this.digitAt < DIGITS_MS;
+    const unum = second ? 10 + digit : digit || 10;
+    this.digitBefore = second ? null : digit;
+    this.digitAt = now;
+    this.choose(this.match.team(this.view.chosen ?? this.lastChosen ?? 0) * 11 + unum - 1);
   }
 
   tap(at, scale) {
@@ -205,7 +215,7 @@ class Replay {
     this.clock.pause();
     this.clock.seek(next);
     const event = this.events.all.find((one) => one.frame === next && (kind === "any" || one.kind === kind));
-    if (event) this.announce(`Cycle ${this.match.cycle(next)}: ${event.kind}, ${event.text}`);
+    if (event) this.announce(`Cycle ${this.match.cycle(next)}: ${event.kind} ${event.text}`);
   }
 
   seekEvent(event) {
@@ -383,8 +393,9 @@ class Replay {
     if (shootOut) byId("score").append(element("small", "", `  penalties ${shootOut[0][0]} : ${shootOut[1][0]}`));
     byId("mode").textContent = match.mode(frame).replaceAll("_", " ");
     const stoppage = match.stoppage(frame);
-    const text = `cycle ${match.cycle(frame)}${stoppage ? ` + ${stoppage}` : ""} of ${match.lastCycle}`;
+    const text = `cycle ${match.cycle(frame)}${stoppage ? ` + ${stoppage}` : ""}`;
     byId("time").textContent = text;
+    byId("last").textContent = ` of ${match.lastCycle}`;
     if (document.activeElement !== byId("cycle")) byId("cycle").value = `${match.cycle(frame)}${stoppage ? `.${stoppage}` : ""}`;
     this.panel.draw(frame, view.chosen);
     this.events.follow(frame);

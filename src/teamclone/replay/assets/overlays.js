@@ -104,12 +104,14 @@ function drawCommands(context, camera, match, slot, time, whole) {
   const frame = Math.min(Math.floor(time), match.frames - 1);
   const expected = match.expected(slot, frame);
   const done = match.done(slot, frame);
-  if (done && whole) {
+  if (expected) drawExpected(context, camera, match, slot, time, expected.likeliest, whole);
+  if (done) {
     const [first, second] = done.values;
     drawCommand(context, camera, match, slot, time, { word: done.word, first, second, colour: colours.ink, solid: true });
   }
-  if (!expected) return;
-  const { word, values, p } = expected.likeliest;
+}
+
+function drawExpected(context, camera, match, slot, time, { word, values, p }, whole) {
   const number = (argument) => values.find((one) => one.argument === argument);
   drawCommand(context, camera, match, slot, time, {
     word,
@@ -141,9 +143,11 @@ function drawCommand(context, camera, match, slot, time, { word, first, second, 
   const pixels = Math.max(length * camera.scale, 34) * Math.max(share, 0.15) + (power ? 0 : discRadius(camera) * 0.4);
   const angle = (body + direction + (first < 0 && power ? 180 : 0)) * RADIANS;
   if (spread > 0) wedge(context, from, angle, pixels * 1.05, Math.min(spread, 180) * RADIANS, colour);
-  if (word === "turn") turnArrow(context, from, body * RADIANS, direction * RADIANS, pixels * 0.8, colour, solid);
-  else arrow(context, from, angle, pixels, colour, solid, discRadius(camera) * (word === "dash" || word === "catch" ? 1.1 : 0));
-  if (label) tag(context, from[0] + Math.cos(angle) * (pixels + 12), from[1] + Math.sin(angle) * (pixels + 12), label, colour);
+  const radius = discRadius(camera);
+  const start = word === "kick" || word === "tackle" ? 0 : radius * 1.1;
+  if (word === "turn") sweep(context, from, body * RADIANS, direction * RADIANS, radius * 1.75 + (solid ? 0 : 3), colour);
+  arrow(context, from, angle, pixels, colour, { solid, start, width: (word === "turn" ? 1.5 : 2.2) * (solid ? 1 : 2) });
+  if (label) tag(context, from, angle, Math.max(start + pixels, radius * 2) + 8, label, colour);
 }
 
 function wedge(context, [x, y], angle, length, half, colour) {
@@ -157,51 +161,51 @@ function wedge(context, [x, y], angle, length, half, colour) {
   context.globalAlpha = 1;
 }
 
-function arrow(context, [x, y], angle, length, colour, solid, start) {
-  context.setLineDash(solid ? [] : [5, 3.5]);
-  ray(context, x, y, angle, start, start + length - 5, colour, solid ? 2.6 : 2.4);
+function arrow(context, [x, y], angle, length, colour, { solid, start, width }) {
+  context.setLineDash(solid ? [] : [6, 4]);
+  context.globalAlpha = solid ? 1 : 0.8;
+  ray(context, x, y, angle, start, start + length - 5, colour, width);
   context.setLineDash([]);
-  head(context, x + Math.cos(angle) * (start + length), y + Math.sin(angle) * (start + length), angle, colour);
+  head(context, x + Math.cos(angle) * (start + length), y + Math.sin(angle) * (start + length), angle, colour, solid ? 1 : 1.5);
+  context.globalAlpha = 1;
 }
 
-function turnArrow(context, [x, y], body, moment, radius, colour, solid) {
-  const away = solid ? radius : radius * 1.22;
+/** The way that a body turns, as an arc. */
+function sweep(context, [x, y], body, moment, radius, colour) {
   context.beginPath();
-  context.arc(x, y, away, body, body + moment, moment < 0);
-  context.setLineDash(solid ? [] : [5, 3.5]);
+  context.arc(x, y, radius, body, body + moment, moment < 0);
   context.strokeStyle = colour;
-  context.lineWidth = solid ? 2.6 : 2.4;
+  context.lineWidth = 1.6;
   context.stroke();
-  context.setLineDash([]);
-  const end = body + moment;
-  head(context, x + Math.cos(end) * away, y + Math.sin(end) * away, end + (moment < 0 ? -Math.PI / 2 : Math.PI / 2), colour);
 }
 
-function head(context, x, y, angle, colour) {
+function head(context, x, y, angle, colour, size) {
   const at = (turn, length) => [x + Math.cos(angle + turn) * length, y + Math.sin(angle + turn) * length];
   context.beginPath();
   context.moveTo(...at(0, 4));
-  context.lineTo(...at(2.5, 7));
-  context.lineTo(...at(-2.5, 7));
+  context.lineTo(...at(2.5, 7 * size));
+  context.lineTo(...at(-2.5, 7 * size));
   context.closePath();
   context.fillStyle = colour;
   context.fill();
 }
 
-/** A word on a plate that keeps it legible above anything. */
-export function tag(context, x, y, text, colour) {
+/** A word on a plate that keeps it legible above anything, so far away that it covers nothing before. */
+function tag(context, [x, y], angle, away, text, colour) {
   context.font = `600 12px ${FONT}`;
   const width = context.measureText(text).width + 8;
+  const middle = x + Math.cos(angle) * (away + width / 2);
+  const height = y + Math.sin(angle) * (away + 9);
   context.globalAlpha = 0.88;
   context.fillStyle = colours.paper;
   context.beginPath();
-  context.roundRect(x - width / 2, y - 9, width, 18, 5);
+  context.roundRect(middle - width / 2, height - 9, width, 18, 5);
   context.fill();
   context.globalAlpha = 1;
   context.fillStyle = colour;
   context.textAlign = "center";
   context.textBaseline = "middle";
-  context.fillText(text, x, y + 0.5);
+  context.fillText(text, middle, height + 0.5);
 }
 
 function drawFan(context, camera, match, fan, time) {

@@ -11,7 +11,7 @@ export function numbersOf(word, [first, second] = []) {
   const known = (value) => value !== undefined && !Number.isNaN(value);
   if (word === "dash" || word === "kick") {
     if (!known(first)) return known(second) ? `towards ${number(second)}°` : "";
-    return `${number(first)}${known(second) && (second !== 0 || word === "kick") ? ` towards ${number(second)}°` : ""}`;
+    return `${number(first)}${known(second) && (second !== 0 || word === "kick") ? `, ${number(second)}°` : ""}`;
   }
   if (word === "move") return known(first) ? `${number(first, 1)}, ${number(second, 1)}` : "";
   return known(first) && word !== "none" ? `${number(first, word === "turn" ? 1 : 0)}°` : "";
@@ -135,7 +135,7 @@ export class Panel {
   buildAll() {
     const table = element("table", "team");
     const head = document.createElement("tr");
-    const columns = ["", "did", ...(this.match.predictions ? ["clone", "p"] : []), "stamina"];
+    const columns = ["", "did", ...(this.match.predictions ? ["clone", "gave it"] : []), "stamina"];
     head.append(...columns.map((text) => {
       const cell = element("th", "", text);
       cell.scope = "col";
@@ -196,7 +196,7 @@ function likeliest({ word, p, values }) {
 
 const FIELDS = [
   ["place", false], ["speed", false], ["body", false], ["neck", false], ["to ball", false], ["view", false],
-  ["stamina", true], ["effort", false], ["recovery", false], ["type", true], ["points at", false], ["listens to", false], ["focus", true], ["said", true],
+  ["stamina", true], ["effort", false], ["recovery", false], ["type", true], ["points to", false], ["hears", false], ["focus", true], ["said", true],
 ];
 
 function factsOf(match, slot, frame) {
@@ -222,8 +222,8 @@ function factsOf(match, slot, frame) {
     effort: number(value("effort"), 2),
     recovery: number(value("recovery"), 2),
     type: typeText(match, slot, frame),
-    "points at": Number.isNaN(value("pointto_x")) ? "–" : `${number(value("pointto_x"))}, ${number(value("pointto_y"))}`,
-    "listens to": listens > 0 ? `${((listens - 1) % 11) + 1} ${match.team(listens - 1) === match.team(slot) ? "" : "of the others"}` : "–",
+    "points to": Number.isNaN(value("pointto_x")) ? "–" : `${number(value("pointto_x"))}, ${number(value("pointto_y"))}`,
+    "hears": listens > 0 ? `${((listens - 1) % 11) + 1} ${match.team(listens - 1) === match.team(slot) ? "" : "of the others"}` : "–",
     focus: focus > 0 ? `${number(focus, 1)} m away, ${number(value("focus_direction"))}°` : "–",
     said: said ? `“${said.text}”${ago ? `, ${ago} ago` : ""}` : "–",
   };

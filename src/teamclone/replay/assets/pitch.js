@@ -113,8 +113,10 @@ function drawStamina(context, match, slot, frame, x, y, radius, edge) {
   context.beginPath();
   context.arc(x, y, radius + 2.6, start, start + 2 * Math.PI * Math.max(share, 0.01));
   context.strokeStyle = share < low ? colours.low : edge;
-  context.lineWidth = share < low ? 3 : 2;
+  context.lineWidth = share < low ? 3 : 1.8;
+  context.globalAlpha = share < low ? 1 : 0.6;
   context.stroke();
+  context.globalAlpha = 1;
 }
 
 export function drawBall(context, camera, match, time) {

@@ -3,8 +3,10 @@
 import { colours, fitted, FONT } from "./theme.js";
 
 const BESIDE = 75; // frames to each side of the middle of the detail
-const MOST_LOSS = 4; // nats at the top of the graphs; greater losses are cut off
-const RIBBON = 9; // pixels of a row of commands
+const LEAST_TOP = 0.25; // nats at the top of the graphs, at least
+const CUT_OFF = 0.005; // share of the cycles whose loss is beyond the top
+const RIBBON = 10; // pixels of a row of commands
+const CELL = { dash: 0.5, turn: 0.75 }; // share of the row that a command fills, so that colour is not all; others all
 const MARKED = new Set(["goal", "shot", "card", "set play", "turnover", "foul"]);
 
 /** What the graphs show: one or two series of log loss, or the ball's x where there is no prediction. */
@@ -12,17 +14,23 @@ export function seriesOf(match, chosen) {
   const range = (first) => Array.from({ length: 11 }, (_, i) => first + i);
   if (chosen !== null && match.predicted(chosen)) {
     const values = match.losses([chosen]);
-    return { title: `surprise at ${match.label(chosen)}, nats`, of: [{ values, colour: edge(chosen < 11 ? 0 : 1) }], slots: [chosen] };
+    return { title: `surprise at ${match.label(chosen)}, nats`, of: [{ values, colour: edge(chosen < 11 ? 0 : 1) }], top: topOf([values]), slots: [chosen] };
   }
   const teams = [0, 1].filter((team) => match.predicted(11 * team));
   if (teams.length) {
     const of = teams.map((team) => ({ values: match.losses(range(11 * team)), colour: edge(team) }));
     const names = teams.map((team) => match.teamName(team)).join(" above, below ");
-    return { title: `surprise at ${names}, mean nats a player`, of, slots: teams.flatMap((team) => range(11 * team)) };
+    return { title: `surprise at ${names}, mean nats a player`, of, top: topOf(of.map((one) => one.values)), slots: teams.flatMap((team) => range(11 * team)) };
   }
   const values = new Float32Array(match.frames);
   for (let frame = 0; frame < match.frames; frame++) values[frame] = match.value("ball_x", 0, frame) / 52.5;
-  return { title: `where the ball is: up towards the right goal`, of: [{ values, colour: edge(0) }], ball: true, slots: [] };
+  return { title: `where the ball is: up towards the right goal`, of: [{ values, colour: edge(0) }], ball: true, top: 1, slots: [] };
+}
+
+/** The loss at the top of the graphs: few are greater. */
+function topOf(all) {
+  const known = all.flatMap((values) => [...values.filter((value) => !Number.isNaN(value))]).sort((a, b) => a - b);
+  return Math.max(LEAST_TOP, known[Math.floor((1 - CUT_OFF) * (known.length - 1))] ?? 0);
 }
 
 const edge = (team) => (team === 0 ? "left-edge" : "right-edge");
@@ -73,7 +81,7 @@ export class Overview {
       for (let x = 0; x < width; x++) {
         const [mean, most] = binned(values, Math.floor((x / width) * values.length), Math.ceil(((x + 1) / width) * values.length), ball);
         if (Number.isNaN(mean)) continue;
-        const bar = (value) => up * tall * Math.max(-1, Math.min(1, ball ? value : value / (this.series.slots.length === 1 ? MOST_LOSS : 1)));
+        const bar = (value) => up * tall * Math.max(-1, Math.min(1, value / this.series.top));
         context.fillStyle = colours[ball && mean < 0 ? "right-edge" : colour];
         context.globalAlpha = 0.3;
         context.fillRect(x, base, 1, -bar(most));
@@ -153,42 +161,47 @@ export class Detail {
     this.axis(context, first, last, x, height);
     this.bars(context, { first, last, x, step, top, bottom });
     if (ribbons) this.ribbons(context, view.chosen, { first, last, x, step, y: bottom + 3 });
-    for (const event of this.events)
-      if (event.frame >= first && event.frame <= last && MARKED.has(event.kind)) this.word(context, event, x(event.frame), top, bottom);
-    context.fillStyle = colours.ink;
-    context.fillRect(width / 2 - 1, 0, 2, height);
     context.font = `11px ${FONT}`;
     context.textAlign = "left";
     context.textBaseline = "top";
     plate(context, series.title, 5, 2, colours.muted);
+    const free = [0, 0]; // where the next word may begin, in two rows
+    for (const event of this.events)
+      if (event.frame >= first && event.frame <= last && MARKED.has(event.kind)) this.word(context, event, x(event.frame), { top, bottom, free });
+    this.dots(context, { first, last, x, step, top });
+    context.fillStyle = colours.ink;
+    context.fillRect(width / 2 - 1, 0, 2, height);
   }
 
   bars(context, { first, last, x, step, top, bottom }) {
-    const { of, ball, slots } = this.series;
+    const { of, ball } = this.series;
     const two = of.length === 2 || ball;
     const base = two ? (top + bottom) / 2 : bottom;
     const tall = two ? (bottom - top) / 2 : bottom - top;
-    const most = ball ? 1 : slots.length === 1 ? MOST_LOSS : 1.5;
     of.forEach(({ values, colour }, index) => {
       for (let frame = first; frame <= last; frame++) {
         const value = values[frame];
         if (Number.isNaN(value)) continue;
-        const length = (index === 0 ? 1 : -1) * tall * Math.max(-1, Math.min(1, value / most));
+        const length = (index === 0 ? 1 : -1) * tall * Math.max(-1, Math.min(1, value / this.series.top));
         context.fillStyle = colours[ball && value < 0 ? "right-edge" : colour];
         context.globalAlpha = frame === Math.floor(this.now) ? 1 : 0.75;
         context.fillRect(x(frame), base, Math.max(1, step - 1), -(Math.abs(length) < 1 ? Math.sign(length || 1) : length));
       }
     });
     context.globalAlpha = 1;
+    context.fillStyle = colours.rule;
+    context.fillRect(0, base, this.canvas.clientWidth, 1);
+  }
+
+  /** Dots above the surprises that the keys go to. */
+  dots(context, { first, last, x, step, top }) {
     context.fillStyle = colours.model;
     for (let frame = first; frame <= last; frame++)
       if (this.peaks.has(frame)) {
         context.beginPath();
-        context.arc(x(frame) + step / 2, top - 1, 3, 0, 2 * Math.PI);
+        context.arc(x(frame) + step / 2, top + 2, 3.2, 0, 2 * Math.PI);
         context.fill();
       }
-    context.fillStyle = colours.rule;
-    context.fillRect(0, base, this.canvas.clientWidth, 1);
   }
 
   /** Two rows of a player's commands: what the clone expected, and what was done. */
@@ -211,7 +224,8 @@ export class Detail {
     if (word === "none") return;
     context.globalAlpha = alpha;
     context.fillStyle = colours[word] ?? colours.muted;
-    context.fillRect(x, y, Math.max(1, step - 0.7), RIBBON);
+    const height = RIBBON * (CELL[word] ?? 1);
+    context.fillRect(x, y + RIBBON - height, Math.max(1, step - 0.7), height);
     context.globalAlpha = 1;
   }
 
@@ -229,14 +243,18 @@ export class Detail {
     }
   }
 
-  word(context, event, x, top, bottom) {
+  word(context, event, x, { top, bottom, free }) {
     context.fillStyle = event.side ? colours[event.side > 0 ? "left-edge" : "right-edge"] : colours.muted;
     context.fillRect(x - 0.75, top, 1.5, bottom - top);
     if (event.kind === "turnover" || event.kind === "set play" || event.kind === "foul") return;
     context.font = `600 11px ${FONT}`;
     context.textAlign = "left";
     context.textBaseline = "top";
-    plate(context, event.unum ? `${event.kind} ${event.unum}` : event.kind, x + 3, top + 2, context.fillStyle);
+    const text = event.unum ? `${event.kind} ${event.unum}` : event.kind;
+    const row = free.findIndex((from) => from <= x);
+    if (row < 0) return;
+    free[row] = x + context.measureText(text).width + 9;
+    plate(context, text, x + 4, top + 2 + 14 * row, context.fillStyle);
   }
 }
 

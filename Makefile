@@ -15,7 +15,7 @@ DEMO := demo
 .PHONY: help install browser demo test docs lint format bench fidelity faults fuzz clean
 
 help:
-	@echo "make demo     train and report a clone of HELIOS_base on the bundled matches"
+	@echo "make demo     train, replay and report a clone of HELIOS_base on the bundled matches"
 	@echo "make test     run the tests"
 	@echo "make docs     the documentation as one site, site/index.html; its generated pages and figures"
 	@echo "make lint     ruff and mypy"
@@ -33,12 +33,12 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	touch $@
 
-# One test opens the report in a real browser.
+# Some tests open pages in a real browser.
 browser:
 	@command -v chromium >/dev/null || command -v google-chrome >/dev/null || \
 	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq chromium >/dev/null; \
-	  else echo "no chromium on the PATH: the browser test is skipped (Debian: apt-get install chromium)"; fi
+	  else echo "no chromium on the PATH: the browser tests are skipped (Debian: apt-get install chromium)"; fi
 
 demo: install
 	rm -rf $(DEMO)
@@ -48,6 +48,7 @@ demo: install
 	$(BIN)/teamclone bench $(DEMO)/run -n 4000
 	$(BIN)/teamclone evaluate $(DEMO)/run
 	$(BIN)/teamclone rollout $(DEMO)/run samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --starts 12 --samples 16 --horizon 30
+	$(BIN)/teamclone replay samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --run $(DEMO)/run --rollouts $(DEMO)/run/rollouts/fans.json --out $(DEMO)/run/replay.html
 	$(BIN)/teamclone report $(DEMO)/run
 
 test: install browser
@@ -77,6 +78,7 @@ bench: install
 	$(BIN)/teamclone dataset --store .bench/store --team $(TEAM) --out .bench/dataset >/dev/null
 	$(BIN)/python benchmarks/training.py .bench/dataset
 	$(BIN)/python benchmarks/stores.py $(MATCHES) --count 2
+	$(BIN)/python benchmarks/replay.py $(MATCHES)
 
 fidelity: install
 	$(BIN)/python benchmarks/fidelity.py $(MATCHES) --out $(FIDELITY) --page docs/explanation/fidelity.md --team $(TEAM) $(OPTIONS)

@@ -129,8 +129,9 @@ def make_replay(
         expected = predicted(open_run(Path(run)), columns, teams=teams, checkpoint=checkpoint, on_progress=on_progress)
     fans = [] if rollouts is None else read_fans(Path(rollouts), columns)
     events = find_events(columns.frames, columns.players, columns.params)
-    page, notes = _page(columns, expected, fans=fans, events=events, says=says)
     path = Path(out)
+    beside_report = run is not None and path.parent.resolve() == Path(run).resolve()
+    page, notes = _page(columns, expected, fans=fans, events=events, says=says, report=beside_report)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, page)
     if jasmin is not None:
@@ -170,16 +171,22 @@ def _says(columns: MatchColumns, text_of: Callable[[int], str]) -> Says:
 
 
 def _page(
-    match: MatchColumns, expected: Predictions, *, fans: list[dict[str, Any]], events: Sequence[Event], says: Says
+    match: MatchColumns,
+    expected: Predictions,
+    *,
+    fans: list[dict[str, Any]],
+    events: Sequence[Event],
+    says: Says,
+    report: bool,
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Return the page and the notes on it."""
+    """Return the page and the notes on it; ``report``: whether the report of the run lies beside it."""
     channels = [
         *of_match(match.frames, match.players),
         *of_commands(match.frames, match.players, match.commands, match.params),
         *expected.channels,
     ]
     notes = [*expected.notes, *_notes(match, {channel.name for channel in channels})]
-    head = _head(match, expected, fans=fans, events=events)
+    head = {**_head(match, expected, fans=fans, events=events), "report": report}
     page = _assembled(packed({**head, "says": says, "notes": notes}, channels))
     if len(page) > MOST_BYTES and says[0]:
         notes.append("What players said is left out: with it the page would be larger than 3 MB.")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import jinja2
 from markupsafe import Markup
@@ -266,18 +268,25 @@ def make_report(
             on_progress=telling("response times"),
         )
     ahead = fresh_rollouts(run, checkpoint=evaluation["run"]["checkpoint"])
+    path = out or run.path / "report.html"
     history = run.history()
     try:
-        html = render(run, evaluation, bench, history=history, ahead=ahead)
+        html = render(run, evaluation, bench, history=history, ahead=ahead, replays=replays_of(run, path.parent))
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, jinja2.TemplateError) as error:
         raise RunError(
             f"{run.path}: evaluation.json or bench.json is not what teamclone wrote ({error!r}); make them again with "
             "`teamclone evaluate` and `teamclone bench`"
         ) from error
-    path = out or run.path / "report.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, html.encode())
     return path
+
+
+def replays_of(run: Run, folder: Path) -> list[tuple[str, str]]:
+    """Return the replays in the folder of a run: name, and address as seen from a folder."""
+    names = sorted(page.name for page in run.path.glob("replay*.html"))
+    beside = Path(os.path.relpath(run.path.resolve(), folder.resolve())).as_posix()
+    return [(name, quote(f"{beside}/{name}")) for name in names]
 
 
 def fresh_evaluation(run: Run) -> dict[str, Any] | None:
@@ -426,6 +435,7 @@ def render(
     *,
     history: Sequence[Mapping[str, Any]],
     ahead: Ahead | None = None,
+    replays: Sequence[tuple[str, str]] = (),
 ) -> str:
     """Return the report as HTML.
 
@@ -435,6 +445,7 @@ def render(
         bench: from `latency.measure_latency`; None leaves the response times out.
         history: from ``run.history()``; empty leaves the training curves out.
         ahead: from `fresh_rollouts`; None leaves the roll-outs out.
+        replays: from `replays_of`.
     """
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -470,6 +481,7 @@ def render(
         paper=paper,
         plots=_plots(evaluation, bench, history, ahead),
         ahead=ahead,
+        replays=replays,
         trained_error=trained_error(run.config),
         settings=to_toml(run.config),
         versions={**run.environment, **evaluation["versions"]},

@@ -66,6 +66,7 @@ class Replay {
     byId("left-name").textContent = match.teamName(0);
     byId("right-name").textContent = match.teamName(1);
     document.title = `${match.teamName(0)} – ${match.teamName(1)} · teamclone replay`;
+    byId("report").hidden = !match.head.report;
     for (const speed of SPEEDS) byId("speed").append(new Option(`${speed} ×`, String(speed)));
     for (const [value, text] of [["none", "nothing"], ["ball", "ball"], ["player", "player"]]) byId("follow").append(new Option(text, value));
     for (const kind of ["any", ...this.events.kinds]) byId("jump").append(new Option(kind === "any" ? "next shown" : kind, kind));
@@ -367,7 +368,7 @@ class Replay {
     this.detail.draw(time, view);
     if (asked) this.drawControls();
     if (asked || (clock.frame !== this.frameShown && now - this.panelDrawn > PANEL_MS)) this.drawFrame(now);
-    this.pictures++;
+    if (!this.pictures++) this.firstPicture = performance.now();
   }
 
   /** What changes with the user. */

@@ -56,6 +56,9 @@ def folder(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def predicted(folder: Path, log: Path) -> Path:
     """A page with the predictions of both teams and with futures."""
+    assert unpack_page(make_replay(log, folder / "run" / "replay.html", run=folder / "run").path.read_text()).head[
+        "report"
+    ]
     size = ("--starts", 2, "--samples", 3, "--horizon", 12)
     invoked("rollout", folder / "run", log, *size, "--trajectories", "--out", folder / "rollouts")
     made = make_replay(
@@ -157,6 +160,7 @@ def test_the_command(folder: Path, log: Path, tmp_path: Path) -> None:
     assert answer["predicted"] == ["HELIOS_base"]
     assert answer["size"] == out.stat().st_size
     assert answer["events"]["kick"] > 50
+    assert unpack_page(out.read_text()).head["report"] is False
     assert replay.read_text().startswith("RPL 2D 1\n")
     match_id = tc.read_match(log).match_id
     assert invoked("replay", match_id, "--store", folder / "store", "--out", out).strip() == str(out)
@@ -308,12 +312,14 @@ def test_keys_jump_to_what_happened(page: Page, predicted: Path) -> None:
         assert page.evaluate("replay.clock.frame") == frames[0], kind
     page.press("Home")
     page.press("s")
+    page.wait_for("!replay.dirty")
     frame = page.evaluate("replay.clock.frame")
     greatest = np.nanmax(columns["loss"][frame])
     assert greatest > np.nanquantile(columns["loss"], 0.99)
     # The list has it, marked as the present one, with its player.
     assert page.evaluate("document.querySelector('#list [aria-current]').textContent").startswith(str(cycle(page)))
     page.evaluate("document.querySelector('#list [aria-current] button').click()")
+    page.wait_for("!replay.dirty")
     chosen = page.evaluate("replay.view.chosen")
     assert columns["loss"][frame, chosen] == pytest.approx(greatest)
     verdict = page.evaluate("document.querySelector('.verdict').textContent")
@@ -373,6 +379,32 @@ def test_a_player_is_chosen_by_a_click_and_followed(page: Page, predicted: Path)
 
 @pytest.mark.browser
 @in_a_browser
+def test_fingers_choose_and_zoom(page: Page, predicted: Path) -> None:
+    opened(page, predicted, "#c=150", width=390, height=844)
+    left, top, *_ = box_of(page, "pitch")
+    x, y = page.evaluate("replay.camera.toPixels(replay.match.place(0, replay.clock.now))")
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        page.call(
+            "Input.dispatchTouchEvent",
+            type=kind,
+            touchPoints=[{"x": left + x, "y": top + y, "id": index} for index, (x, y) in enumerate(points)],
+        )
+
+    touch("touchStart", (x, y))
+    touch("touchEnd")
+    assert page.evaluate("replay.view.chosen") == 0
+    touch("touchStart", (150, 100))
+    touch("touchStart", (150, 100), (200, 100))
+    for spread in range(10, 60, 10):
+        touch("touchMove", (150 - spread, 100), (200 + spread, 100))
+    touch("touchEnd")
+    assert page.evaluate("replay.camera.zoom") == pytest.approx(3, abs=0.3)
+    assert page.problems == []
+
+
+@pytest.mark.browser
+@in_a_browser
 def test_pictures_and_clips(page: Page, predicted: Path) -> None:
     opened(page, predicted, "#c=150")
     size = page.evaluate(
@@ -381,7 +413,7 @@ def test_pictures_and_clips(page: Page, predicted: Path) -> None:
     assert bytes(size[:8]) == b"\x89PNG\r\n\x1a\n"
     assert int.from_bytes(bytes(size[16:20]), "big") > 600
     page.press("c")
-    page.wait_for("replay.clock.now > replay.match.frameOf(150) + 8")
+    page.wait_for("replay.clock.now > replay.match.frameOf(150) + 8 && replay.pictures > 10")
     page.press("c")
     page.wait_for("Boolean(replay.capture.lastClip)")
     clip = page.evaluate(

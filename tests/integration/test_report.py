@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from teamclone.evaluation.evaluate import evaluate, load_evaluation
 from teamclone.evaluation.predict import predict
 from teamclone.models.clone import model_id
 from teamclone.rcss.commands import CLONED_KINDS
-from teamclone.report.page import make_report, number, percent
+from teamclone.report.page import make_report, number, percent, replays_of
 from teamclone.training.checkpoint import save_weights
 from teamclone.training.config import load_config
 from teamclone.training.loop import train
@@ -257,6 +258,18 @@ def test_report_keeps_what_is_fresh_and_renews_what_is_stale(run: Run) -> None:
     (run.path / "evaluation.json").write_text("{ damaged", encoding="utf-8")
     assert make_report(run, out=run.path / "elsewhere.html").is_file()
     assert load_evaluation(run.path / "evaluation.json")["run"]["model_id"] == model_id(other)
+
+
+def test_it_links_to_the_replays_beside_the_run(run: Run, tmp_path: Path) -> None:
+    assert replays_of(run, run.path) == []
+    for name in ("replay.html", "replay <b>.html", "other.html"):
+        (run.path / name).write_text("", encoding="utf-8")
+    assert ("replay.html", "./replay.html") in replays_of(run, run.path)
+    elsewhere = make_report(run, out=tmp_path / "pages" / "x.html", quick_predictions=0)
+    links = re.findall(r'<a href="([^"]*)">(replay[^<]*)</a>', elsewhere.read_text(encoding="utf-8"))
+    assert [name for _, name in links] == ["replay &lt;b&gt;.html", "replay.html"]
+    for address, _ in links:
+        assert (elsewhere.parent / unquote(address)).is_file()
 
 
 def test_command_line(run: Run, tmp_path: Path) -> None:

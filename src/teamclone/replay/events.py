@@ -207,7 +207,7 @@ def _of_modes(frames: Columns, found: list[Touch]) -> Iterator[Event]:
         elif SITUATION[now] == Situation.GOAL:
             yield _goal(frames, at, int(-RESTARTS[now]), found)
         elif SITUATION[now] == Situation.FAULT:
-            yield Event(frame=at, kind=EventKind.FOUL, side=int(-RESTARTS[now]), text=name)
+            yield Event(frame=at, kind=EventKind.FOUL, side=int(-RESTARTS[now]), text=name.removeprefix("foul "))
         else:
             yield Event(frame=at, kind=EventKind.SET_PLAY, side=int(RESTARTS[now]), text=name)
 

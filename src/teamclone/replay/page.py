@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -214,8 +215,8 @@ def _head(
 ) -> dict[str, Any]:
     """Return what the page knows of the match beside its channels."""
 
-    def parameter(name: str) -> float:
-        return server_params.number(match.params, name, version=server_params.OLDEST)
+    def parameter(name: str) -> float | None:
+        return _finite(server_params.number(match.params, name, version=server_params.OLDEST))
 
     return {
         "teamclone": __version__,
@@ -230,12 +231,17 @@ def _head(
             name: parameter(name)
             for name in ("stamina_max", "effort_dec_thr", "ball_size", "ball_decay", "recover_dec_thr")
         },
-        "types": {name: [round(float(value), 5) for value in match.types[name]] for name in FIELDS},
+        "types": {name: [_finite(value) for value in match.types[name]] for name in FIELDS},
         "kinds": [kind.value for kind in EventKind],
         "events": [list(asdict(event).values()) for event in events],
         "predictions": expected.about if expected.of else None,
         "fans": {"step": STEP_M, "of": fans},
     }
+
+
+def _finite(value: float) -> float | None:
+    """Return a number as JSON has it; None for one that JSON has not."""
+    return round(float(value), 5) if math.isfinite(value) else None
 
 
 def _assembled(data: bytes) -> bytes:

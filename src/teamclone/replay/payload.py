@@ -66,7 +66,7 @@ def packed(head: Mapping[str, Any], channels: Iterable[Channel]) -> bytes:
             }
         )
         parts.append(_coded(values, coding))
-    text = json.dumps({"format": FORMAT, **head, "columns": listed}, ensure_ascii=False, allow_nan=False).encode()
+    text = json.dumps({"format": FORMAT, **head, "columns": listed}, allow_nan=False).encode()
     return zlib.compress(b"".join([struct.pack("<I", len(text)), text, *parts]), 9)
 
 

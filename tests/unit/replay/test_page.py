@@ -33,6 +33,19 @@ def match(samples_dir: Path) -> Match:
 
 
 @pytest.fixture(scope="module")
+def short(match: Match) -> Match:
+    """Its first frames."""
+    assert match.log is not None
+    n = 200
+    frames = {name: values[:n] for name, values in match.frames.items()}
+    players = {name: values[:n] for name, values in match.players.items()}
+    kept = match.log.commands["frame"] < n
+    commands = {name: values[kept] for name, values in match.log.commands.items()}
+    game = replace(match.game, frames=frames, players=players)
+    return replace(match, game=game, log=replace(match.log, commands=commands))
+
+
+@pytest.fixture(scope="module")
 def page(match: Match, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
     path = make_replay(match, tmp_path_factory.mktemp("replay") / "match.html").path
     return unpack_page(path.read_text(encoding="utf-8"))
@@ -119,41 +132,41 @@ def test_a_full_match_is_small(match: Match, tmp_path: Path) -> None:
     assert made.notes == ()
 
 
-def test_messages_give_way_to_the_size(match: Match, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    full = make_replay(match, tmp_path / "full.html")
+def test_messages_give_way_to_the_size(short: Match, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    full = make_replay(short, tmp_path / "full.html")
     monkeypatch.setattr("teamclone.replay.page.MOST_BYTES", full.size - 1)
-    made = make_replay(match, tmp_path / "small.html")
+    made = make_replay(short, tmp_path / "small.html")
     assert made.size < full.size
     assert ["left out" in note for note in made.notes] == [True]
     assert unpack_page(made.path.read_text()).head["says"] == [[], [], []]
 
 
-def test_hostile_words_are_only_data(match: Match, tmp_path: Path) -> None:
-    assert match.log is not None
-    left, right = replace(match.left, name=HOSTILE), replace(match.right, name="'><svg onload=alert(3)>")
+def test_hostile_words_are_only_data(short: Match, tmp_path: Path) -> None:
+    assert short.log is not None
+    left, right = replace(short.left, name=HOSTILE), replace(short.right, name="'><svg onload=alert(3)>")
     words = HOSTILE.encode()
     log = replace(
-        match.log,
+        short.log,
         text=words,
-        commands=match.log.commands
+        commands=short.log.commands
         | {
-            "text_start": np.zeros_like(match.log.commands["text_start"]),
-            "text_stop": np.full_like(match.log.commands["text_stop"], len(words)),
+            "text_start": np.zeros_like(short.log.commands["text_start"]),
+            "text_stop": np.full_like(short.log.commands["text_stop"], len(words)),
         },
     )
-    odd = replace(match, game=replace(match.game, left=left, right=right), log=log)
+    odd = replace(short, game=replace(short.game, left=left, right=right), log=log)
     html = make_replay(odd, tmp_path / "odd.html").path.read_text(encoding="utf-8")
     found = unpack_page(html).head
     assert (found["left"], found["right"]) == (left.name, right.name)
     assert set(found["says"][2]) == {words.decode()}
-    plain = make_replay(match, tmp_path / "plain.html").path.read_text(encoding="utf-8")
+    plain = make_replay(short, tmp_path / "plain.html").path.read_text(encoding="utf-8")
     for text in ("alert(", "onerror", "onload=alert", "\x1b"):
         assert text not in html
     assert [tag for tag, _ in Elements(html).found] == [tag for tag, _ in Elements(plain).found]
 
 
-def test_the_policy_allows_the_own_script_alone(match: Match, tmp_path: Path) -> None:
-    html = make_replay(match, tmp_path / "match.html").path.read_text(encoding="utf-8")
+def test_the_policy_allows_the_own_script_alone(short: Match, tmp_path: Path) -> None:
+    html = make_replay(short, tmp_path / "match.html").path.read_text(encoding="utf-8")
     page = Elements(html)
     [policy] = [of["content"] for tag, of in page.found if of.get("http-equiv") == "Content-Security-Policy"]
     rules = dict(rule.strip().split(" ", 1) for rule in str(policy).split(";"))

@@ -21,7 +21,10 @@ export function chip(slot) {
 }
 
 /** A probability in words. */
-export const percent = (p) => (p > 0 && p < 0.01 ? "under 1\u00a0%" : `${Math.round(100 * p)}\u00a0%`);
+export const percent = (p) => (p > 0 && p < 0.01 ? "<\u00a01\u00a0%" : `${Math.round(100 * p)}\u00a0%`);
+
+/** A command in a sentence. */
+export const spoken = (word) => (word === "none" ? "nothing" : word);
 
 /** The commands of some players that the clone expected least, as events. */
 export function surprises(match, slots) {
@@ -40,7 +43,7 @@ export function surprises(match, slots) {
   return peaks(greatest).map((frame) => {
     const slot = whose[frame];
     const { answered, likeliest, loss } = match.expected(slot, frame);
-    const text = `${answered.word} (${percent(Math.exp(-loss))} expected), not ${likeliest.word} (${percent(likeliest.p)})`;
+    const text = `${spoken(answered.word)} (${percent(Math.exp(-loss))} expected), not ${spoken(likeliest.word)} (${percent(likeliest.p)})`;
     return { frame, kind: SURPRISE, side: slot < 11 ? 1 : -1, unum: (slot % 11) + 1, text };
   });
 }

@@ -1,7 +1,7 @@
 // What is known of the chosen player in this cycle, or of all players.
 
 import { PLAYERS } from "./match.js";
-import { chip, element, percent } from "./events.js";
+import { chip, element, percent, spoken } from "./events.js";
 
 const number = (value, digits = 0) => (Number.isNaN(value) ? "–" : value.toFixed(digits).replace("-", "−"));
 const UNITS = { deg: "°", power: "", m: " m" };
@@ -116,14 +116,14 @@ export class Panel {
     }
     const did = done ? `${done.word} ${numbersOf(done.word, done.values)}`.trim() : "";
     const parts = [];
-    if (done) parts.push("Did ", element("b", "", done.word === "none" ? "nothing" : did), done.refused ? ", which the server refused. " : ". ");
+    if (done) parts.push("Did ", element("b", "", spoken(did)), done.refused ? ", which the server refused. " : ". ");
     if (!expected) {
       if (match.predicted(slot)) parts.push("Nothing is predicted in this play mode.");
-    } else if (!expected.answered) parts.push(`The clone expected ${expected.likeliest.word}.`);
+    } else if (!expected.answered) parts.push(`The clone expected ${spoken(expected.likeliest.word)}.`);
     else {
       const right = expected.answered === expected.likeliest;
       const p = Math.exp(-expected.loss);
-      parts.push(element("span", right ? "right" : "wrong", right ? "✓ As the clone expected" : `✗ The clone expected ${expected.likeliest.word}`));
+      parts.push(element("span", right ? "right" : "wrong", right ? "✓ As the clone expected" : `✗ The clone expected ${spoken(expected.likeliest.word)}`));
       parts.push(right ? `, with ${percent(p)}.` : `; it gave this ${percent(p)} (${number(expected.loss, 2)} nats).`);
     }
     if (!parts.length) parts.push("No commands are known.");

@@ -83,21 +83,19 @@ function drawPlayer(context, match, slot, time, { x, y, radius, scale, chosen, v
   context.beginPath();
   if (state & STATE.goalie) context.roundRect(x - radius, y - radius, 2 * radius, 2 * radius, radius * 0.35);
   else context.arc(x, y, radius, 0, 2 * Math.PI);
-  context.globalAlpha = lies ? 0.55 : 1;
-  context.fillStyle = colours[side];
+  // Who lies after a tackle is hollow.
+  context.fillStyle = lies ? colours.paper : colours[side];
   context.fill();
-  context.globalAlpha = 1;
   context.lineWidth = 1.6;
   context.strokeStyle = edge;
   if (state & STATE.charged) context.setLineDash([2.5, 2.5]);
   context.stroke();
   context.setLineDash([]);
-  context.fillStyle = colours[`${side}-ink`];
+  context.fillStyle = lies ? edge : colours[`${side}-ink`];
   context.font = `700 ${Math.round(radius * 1.22)}px ${FONT}`;
   context.textAlign = "center";
   context.textBaseline = "middle";
   context.fillText(String((slot % 11) + 1), x, y + radius * 0.06);
-  if (lies) cross(context, x, y, radius * 0.95, edge);
   if (view.show.stamina) drawStamina(context, match, slot, frame, x, y, radius, edge);
   if (next & (STATE.kick | STATE.catch)) ring(context, x, y, radius + 4, colours.ink, { width: 2.4 });
   if (next & (STATE.kickFault | STATE.catchFault)) ring(context, x, y, radius + 4, colours.ink, { width: 2, dash: [3, 3] });

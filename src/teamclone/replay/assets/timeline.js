@@ -19,8 +19,8 @@ export function seriesOf(match, chosen) {
   const teams = [0, 1].filter((team) => match.predicted(11 * team));
   if (teams.length) {
     const of = teams.map((team) => ({ values: match.losses(range(11 * team)), colour: edge(team) }));
-    const names = teams.map((team) => match.teamName(team)).join(" above, below ");
-    return { title: `surprise at ${names}, mean nats a player`, of, top: topOf(of.map((one) => one.values)), slots: teams.flatMap((team) => range(11 * team)) };
+    const names = teams.map((team) => match.teamName(team)).join(" (up) and ") + (teams.length > 1 ? " (down)" : "");
+    return { title: `surprise at ${names}, nats a player`, of, top: topOf(of.map((one) => one.values)), slots: teams.flatMap((team) => range(11 * team)) };
   }
   const values = new Float32Array(match.frames);
   for (let frame = 0; frame < match.frames; frame++) values[frame] = match.value("ball_x", 0, frame) / 52.5;

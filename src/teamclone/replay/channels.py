@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.dynamics.commands import used_arguments
-from teamclone.logs.align import executed_kind, first_body_commands, slot_of
+from teamclone.logs.align import executed_kind, first_body_commands, follows, slot_of
 from teamclone.logs.match import Columns
 from teamclone.replay.payload import Channel, Coding
 
@@ -93,7 +93,7 @@ def of_commands(
         grid = np.full(shape, np.nan)
         grid[at] = numbers[:, index]
         yield Channel(name=f"argument{index}", coding=ARGUMENT, values=grid)
-    counted = players["count_dash"] >= 0
-    refused = (kind != 0) & (executed != kind) & counted
-    refused[-1:] = False  # what became of these the log does not say
+    # Where the next frame is not the next step, or nothing is counted, the log does not say what became of a command.
+    told = follows(frames)[:, None] & (players["count_dash"] >= 0)
+    refused = (kind != 0) & (executed != kind) & told
     yield Channel(name="refused", coding=DONE, values=refused)

@@ -16,7 +16,7 @@ import pytest
 from pages import Unpacked, unpack_page
 from teamclone.errors import UsageError
 from teamclone.logs import Match, find_matches, read_match, read_pair
-from teamclone.logs.align import first_body_commands, slot_of
+from teamclone.logs.align import first_body_commands, follows, slot_of
 from teamclone.logs.match import Columns
 from teamclone.rcss.commands import CommandKind
 from teamclone.replay import channels
@@ -228,6 +228,8 @@ def test_every_odd_match_has_a_page(fixtures_dir: Path, tmp_path: Path) -> None:
         assert (found.head["left"], found.head["right"]) == (match.left.name, match.right.name)
         np.testing.assert_allclose(found.columns["ball_x"], match.frames["ball_x"], atol=0.0051)
         assert found.head["notes"] == list(made.notes)
+        if "refused" in found.columns:
+            assert not found.columns["refused"][~follows(match.frames)].any()
         notes[Path(str(pair.rcg)).parent.name] = made.notes
     assert "No team on the right." in notes["onesided"]
     assert "Logs of this version have no stamina." in notes["native-v1"]

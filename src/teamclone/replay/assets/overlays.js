@@ -147,7 +147,7 @@ function drawCommand(context, camera, match, slot, time, { word, first, second, 
   const start = word === "kick" || word === "tackle" ? 0 : radius * 1.1;
   if (word === "turn") sweep(context, from, body * RADIANS, direction * RADIANS, radius * 1.75 + (solid ? 0 : 3), colour);
   arrow(context, from, angle, pixels, colour, { solid, start, width: (word === "turn" ? 1.5 : 2.2) * (solid ? 1 : 2) });
-  if (label) tag(context, from, angle, Math.max(start + pixels, radius * 2) + 8, label, colour);
+  if (label) tag(context, from, angle, Math.max(start + pixels, radius * 2) + 8, { text: label, colour, size: camera.width < 600 ? 10 : 12 });
 }
 
 function wedge(context, [x, y], angle, length, half, colour) {
@@ -191,15 +191,15 @@ function head(context, x, y, angle, colour, size) {
 }
 
 /** A word on a plate that keeps it legible above anything, so far away that it covers nothing before. */
-function tag(context, [x, y], angle, away, text, colour) {
-  context.font = `600 12px ${FONT}`;
+function tag(context, [x, y], angle, away, { text, colour, size }) {
+  context.font = `600 ${size}px ${FONT}`;
   const width = context.measureText(text).width + 8;
   const middle = x + Math.cos(angle) * (away + width / 2);
-  const height = y + Math.sin(angle) * (away + 9);
+  const height = y + Math.sin(angle) * (away + size * 0.75);
   context.globalAlpha = 0.88;
   context.fillStyle = colours.paper;
   context.beginPath();
-  context.roundRect(middle - width / 2, height - 9, width, 18, 5);
+  context.roundRect(middle - width / 2, height - size * 0.75, width, size * 1.5, 5);
   context.fill();
   context.globalAlpha = 1;
   context.fillStyle = colour;

@@ -174,7 +174,7 @@ export class Panel {
         const expected = match.expected(slot, frame);
         wrong = Boolean(expected?.answered) && expected.answered !== expected.likeliest;
         texts.push(expected ? `${wrong ? "✗ " : ""}${expected.likeliest.word}` : "");
-        texts.push(expected?.answered ? percent(expected.answered.p) : "");
+        texts.push(expected?.answered ? percent(Math.exp(-expected.loss)) : "");
       }
       const stamina = match.value("stamina", slot, frame);
       texts.push(Number.isNaN(stamina) ? "–" : percent(stamina / match.head.server.stamina_max));
@@ -190,13 +190,17 @@ function likeliest({ word, p, values }) {
   if (p < 0.02 || !values.length) return "";
   return values
     .filter((one) => !Number.isNaN(one.value))
-    .map((one) => `${one.name.slice(word.length + 1)} ${number(one.value)}${UNITS[one.unit] ?? ""}${Number.isNaN(one.spread) ? "" : ` ± ${number(one.spread, one.spread < 10 ? 1 : 0)}`}`)
+    .map(({ name, value, unit, spread }) => {
+      const about = Number.isNaN(spread) ? "" : ` ± ${number(spread, spread < 10 ? 1 : 0)}`;
+      return `${name.slice(word.length + 1)} ${number(value)}${UNITS[unit] ?? ""}${about}`;
+    })
     .join(", ");
 }
 
 const FIELDS = [
   ["place", false], ["speed", false], ["body", false], ["neck", false], ["to ball", false], ["view", false],
-  ["stamina", true], ["effort", false], ["recovery", false], ["type", true], ["points to", false], ["hears", false], ["focus", true], ["said", true],
+  ["stamina", true], ["effort", false], ["recovery", false], ["type", true], ["points to", false], ["hears", false],
+  ["focus", true], ["said", true],
 ];
 
 function factsOf(match, slot, frame) {
@@ -206,6 +210,7 @@ function factsOf(match, slot, frame) {
   const speed = match.speed(slot, frame);
   const stamina = value("stamina");
   const capacity = value("capacity");
+  const left = Number.isNaN(capacity) ? "" : `, ${number(capacity)} left to recover`;
   const most = match.head.server.stamina_max;
   const listens = value("listens");
   const said = match.said(slot, frame);
@@ -218,7 +223,7 @@ function factsOf(match, slot, frame) {
     neck: Number.isNaN(value("neck")) ? "–" : `${number(value("neck"))}°`,
     "to ball": `${number(Math.hypot(bx - x, by - y), 1)} m`,
     view: Number.isNaN(value("view_width")) ? "–" : `${number(value("view_width"))}°`,
-    stamina: Number.isNaN(stamina) ? "–" : `${number(stamina)} (${percent(stamina / most)})${Number.isNaN(capacity) ? "" : `, ${number(capacity)} left to recover`}`,
+    stamina: Number.isNaN(stamina) ? "–" : `${number(stamina)} (${percent(stamina / most)})${left}`,
     effort: number(value("effort"), 2),
     recovery: number(value("recovery"), 2),
     type: typeText(match, slot, frame),

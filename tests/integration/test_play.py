@@ -179,16 +179,17 @@ def test_a_client_that_hangs_is_found(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize(
-    ("variable", "limits", "fault", "words"),
+    ("told", "fault", "words"),
     [
-        ("STANDIN_DIE_AT", "", "server died", "the server was ended by SIGSEGV before the end"),
-        ("STANDIN_EXIT_EARLY_AT", "", "logs not whole", "the game log ends at cycle 15 of 40"),
-        ("STANDIN_HANG_AT", "stall_s = 3", "server stalled", "nothing from the server for 3 s"),
+        (("STANDIN_DIE_AT", ""), "server died", "the server was ended by SIGSEGV before the end"),
+        (("STANDIN_EXIT_EARLY_AT", ""), "logs not whole", "the game log ends at cycle 15 of 40"),
+        (("STANDIN_HANG_AT", "stall_s = 3"), "server stalled", "nothing from the server for 3 s"),
     ],
 )
 def test_a_server_that_ends_or_stalls_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, limits: str, fault: str, words: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: tuple[str, str], fault: str, words: str
 ) -> None:
+    variable, limits = told
     monkeypatch.setenv(variable, "15")
     trouble = one(write_schedule(tmp_path, [("Red", "Blue")], limits=limits), tmp_path / "out")
     assert (trouble["fault"], trouble["side"]) == (fault, None)

@@ -14,14 +14,15 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from command import teamclone
 from disk import small_disk
 from teamclone.errors import LogError, StoreError, UsageError
-from teamclone.logs import LogPair
+from teamclone.logs import LogPair, Match
 from teamclone.logs.columns import Source
-from teamclone.store import Store, create_store, ingest, open_store
+from teamclone.store import Store, convert, create_store, ingest, open_store
 from teamclone.store import ingest as ingest_function
 from teamclone.store.status import FileOutcome
 from teamclone.system.workers import DIED
@@ -169,6 +170,24 @@ def test_a_bad_command_log_costs_only_the_commands(logs: Path, store: Store) -> 
     assert f"{PLAIN}.rcl.gz" in commands.error
     assert store.matches()["n_frames"].to_pylist() == [199]
     assert ingest([logs], store).unchanged == 1
+
+
+def test_a_match_that_cannot_be_stored_costs_no_other(
+    logs: Path, store: Store, tmp_path: Path, fixtures_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (other,) = (fixtures_dir / "onesided").glob("*.rcg.gz")
+    tables_of = convert.tables_of
+
+    def fails(match: Match) -> convert.Tables:
+        if match.rcg_path == other:
+            raise pa.ArrowInvalid("value too large")
+        return tables_of(match)
+
+    monkeypatch.setattr(convert, "tables_of", fails)
+    report = ingest([other, logs], store, jobs=1)
+    assert (report.added, report.count(FileOutcome.OK), report.count(FileOutcome.FAILED)) == (1, 2, 2)
+    errors = {row.error for row in report.files if row.outcome is FileOutcome.FAILED}
+    assert errors == {f"{other}: could not be stored (ArrowInvalid: value too large); please report this file"}
 
 
 def test_strict_stops_at_the_first(logs: Path, store: Store) -> None:

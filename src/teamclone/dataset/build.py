@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
+from dataclasses import replace as changed
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -368,6 +369,8 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
         goalkeepers=task.goalkeepers,
         repertoire=task.repertoire,
     )
+    if left_out is not None:  # nor do its cycles count among those that have no command
+        samples = changed(samples, player_cycles=0, idle=0, frozen=0, odd_frames=0)
     return samples, _Parameters(
         left_out=left_out,
         types=np.stack([types[name] for name in FIELDS], axis=-1).astype(np.float32),

@@ -192,7 +192,15 @@ def _ingest_one(task: _Task) -> _Result:
         for status in statuses:
             if status.outcome is not FileOutcome.OK:
                 raise LogError(f"{status.error} (--strict)")
-    return _Result(statuses=statuses, added=task.store.open().add(match))
+    try:
+        return _Result(statuses=statuses, added=task.store.open().add(match))
+    except (TeamcloneError, OSError):  # of the store, which all matches need
+        raise
+    except Exception as error:
+        if task.strict:
+            raise
+        text = f"{task.pair.path}: could not be stored ({type(error).__name__}: {error}); please report this file"
+        return _failed(task.pair, text, stamps)
 
 
 def _check_seen(result: _Result) -> None:

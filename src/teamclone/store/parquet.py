@@ -192,12 +192,13 @@ class ParquetStore(Store):
         known = self._sources(match.match_id)
         if known is not None and known.cover(sources):
             return Added.UNCHANGED
+        tables = convert.tables_of(match)  # what goes wrong here is the match's fault, not the store's
         with _writing(self.root):
             self._unfinished.mkdir(exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix=f"{match.match_id}-", dir=self._unfinished))
             try:
                 folder.chmod(0o755)  # mkdtemp's are private, a store may be shared
-                _write_match(folder, convert.tables_of(match), match_id=match.match_id, sources=sources)
+                _write_match(folder, tables, match_id=match.match_id, sources=sources)
                 if known is not None:
                     self.remove(match.match_id)
                 try:

@@ -399,6 +399,7 @@ def test_a_match_by_impossible_rules_is_left_out_and_named(
     assert f"expected {name} to be" in odd["left_out"]
     assert sum(odd["rows"].values()) == 0
     assert sound["left_out"] is None
+    assert (report["player_cycles"], report["idle"]) == (sound["player_cycles"], sound["idle"])
     assert torch.isfinite(open_dataset(tmp_path / "ds").target(np.arange(10)).parameters).all()
 
 

@@ -38,6 +38,8 @@ def postgres() -> Iterator[Server]:
 
 
 def pytest_configure() -> None:
+    # What tests write need not outlive the machine, and a busy disk takes tenths of a second to say that it would.
+    os.fsync = lambda handle: None
     # Of the stand-in for rcssserver, see tests/standin: the interpreter that starts quickest.
     os.environ["STANDIN_PYTHON"] = sys.executable
     # A shell that starts the tests in the background has them ignore Ctrl-C, and so every command that they start.

@@ -51,7 +51,7 @@ def tiny(folder: Path, **changes: np.ndarray) -> Path:
     for name, value in changes.items():
         (frames if name in frames else samples)[name] = value
     types = np.arange(2 * 3 * len(FIELDS), dtype=np.float32).reshape(2, 3, len(FIELDS))
-    meta = {"team": "A", "matches": [{"match_id": "a"}, {"match_id": "b"}]}
+    meta = {"team": "A", "matches": [{"match_id": name, "opponent": "B"} for name in "ab"]}
     return write_dataset(folder, frames=frames, samples=samples, player_types=types, meta=meta)
 
 
@@ -139,7 +139,7 @@ def followed(folder: Path) -> Path:
     frames["measured"][2, 3, MEASURED_INDEX["neck"]] = MISSING
     samples["frame"][:] = np.arange(10)
     samples["player"][:] = 3
-    meta = {"team": "A", "matches": [{"match_id": "a"}, {"match_id": "b"}]}
+    meta = {"team": "A", "matches": [{"match_id": name, "opponent": "B"} for name in "ab"]}
     types = np.zeros((2, 1, len(FIELDS)), np.float32)
     return write_dataset(folder, frames=frames, samples=samples, player_types=types, meta=meta)
 

@@ -66,7 +66,7 @@ def can_shoot(scene: Array, x: float, y: float, actor: bool) -> bool:
     from_right = 0.5 * width + (middles - right - 0.5 * width + 180.0) % 360.0 - 180.0
     begins, ends = from_right - halves, from_right + halves
     free = 0.0
-    for index in np.argsort(begins):
+    for index in np.argsort(begins, kind="mergesort"):
         if begins[index] >= free:
             break
         if ends[index] > free:

@@ -120,9 +120,9 @@ def _receivers(scene: Array, actor: int) -> None:
     aside = direction(ball[X] - me[X], ball[Y] - me[Y]) - me[BODY]
     ball[GAIN] = kick_rate(me, gap(ball[X], ball[Y], me[X], me[Y]), aside)
     first, second = 0.0, 0.0
-    for player in range(OPPONENT, BALL):
-        if scene[player, PRESENT] > 0:
-            x = scene[player, X]
+    for opponent in range(OPPONENT, BALL):
+        if scene[opponent, PRESENT] > 0:
+            x = scene[opponent, X]
             first, second = max(first, x), max(second, min(first, x))
     ball[OFFSIDE] = max(second, ball[X])
     for mate in range(OPPONENT):

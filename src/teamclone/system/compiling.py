@@ -15,8 +15,8 @@ from numba import njit
 from numba.core import event
 
 kernel: Any = njit(nogil=True, error_model="numpy")
-"""Decorator of kernels. None of them is cached: the function that calls them all is, since Numba's cache does not see
-which calls which."""
+"""Compiles a function that other kernels call. It is not cached, since the cache does not see which calls which: the
+kernel that Python calls is cached with all of them. What such functions may use: `teamclone.export.rules`."""
 
 
 def version_of(*modules: ModuleType) -> int:

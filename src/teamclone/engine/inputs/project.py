@@ -17,6 +17,7 @@ from teamclone.engine.inputs.look import Look, look
 from teamclone.planner.columns import PLAN
 from teamclone.planner.plan import orders_of, plan_scene
 from teamclone.planner.scene import BODY, STAMINA, Array
+from teamclone.system import compiling
 from teamclone.system.compiling import cached_kernel, kernel, tell_when_compiled, version_of
 from teamclone.world import channels
 
@@ -96,7 +97,7 @@ def fill_rest(frames: Frames, index: int, frame: Frame, view: Look, places: Plac
 
 def _compiled() -> Any:
     """Return a kernel that fills the inputs of many samples."""
-    version = version_of(inputs, planner, rcss, channels)
+    version = version_of(inputs, planner, rcss, channels, compiling)
 
     @cached_kernel(nogil=True, error_model="numpy")
     def project_all(

@@ -33,6 +33,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "play": (*BASE, "logs", "protocol", "store"),
     "planner": ("system", "rcss", "dynamics", "world.channels"),
     "engine": ("system", "rcss", "planner", "world.channels"),
+    "export": ("errors", "system", "planner", "engine"),
     "models": (*BASE, "dynamics", "world", "planner", "engine"),
     "training": (*BASE, "world", "dataset", "models"),
     "search": (*BASE, "plots", "dataset", "models", "training"),

@@ -83,4 +83,4 @@ def tell_when_compiled(texts: Mapping[Any, str]) -> None:
     Args:
         texts: by kernel.
     """
-    event.register("numba:compile", _Teller(texts))  # type: ignore[no-untyped-call]  # numba lacks the types
+    event.register("numba:compile", _Teller(texts))

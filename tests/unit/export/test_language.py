@@ -1,0 +1,94 @@
+"""The translation of kernels that use all that can be translated: equal to Numba to the bit, with Numba's types."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba import types
+from tests.cpp import CHECKED, QUICK, compiled, run
+from tests.unit.export import language
+
+from teamclone.export.translate import Entry, Translation, translate
+from teamclone.export.values import array_type, is_array, is_tuple
+
+COLUMNS, ROWS = 40, 400
+ARGUMENTS = (
+    array_type(types.float64, 1),
+    array_type(types.int64, 1),
+    array_type(types.float32, 1),
+    array_type(types.float64, 2),
+    array_type(types.int64, 2),
+)
+ENTRIES = tuple(Entry(name=one.py_func.__name__, kernel=one, arguments=ARGUMENTS) for one in language.KERNELS)
+FLOATS = (0.75, -2.5, 3.5, 0.0, -0.0, 1e-3, 60.0, -181.0, 2.5, 720.25, 1e17, -1e300, 1e300, np.inf, -np.inf, np.nan)
+INTS = (3, 0, -1, 7, -5, 2, 12, 1 << 62, -(1 << 62), -(1 << 63), 5, -64)
+SINGLES = (0.5, -1.25, 0.1, 3.0, -0.0, 7.7, -100.25, 1e-6)
+
+
+def inputs() -> dict[str, np.ndarray]:
+    """What each kernel is given."""
+    return {
+        "a": np.array(FLOATS),
+        "i": np.array(INTS),
+        "f": np.array(SINGLES, np.float32),
+        "floats": np.zeros((ROWS, COLUMNS)),
+        "ints": np.zeros((ROWS, COLUMNS), np.int64),
+    }
+
+
+@pytest.fixture(scope="module")
+def header() -> str:
+    return translate(ENTRIES, version="v1")
+
+
+@pytest.fixture(scope="module")
+def expected() -> list[tuple[np.ndarray, np.ndarray]]:
+    """What Numba makes of the inputs."""
+    made = []
+    for kernel in language.KERNELS:
+        given = inputs()
+        kernel(*given.values())
+        made.append((given["floats"], given["ints"]))
+    return made
+
+
+@pytest.mark.parametrize(("compiler", "flags"), [("g++", QUICK), ("clang++", QUICK), ("g++", CHECKED)])
+def test_kernels_give_what_numba_gives(
+    header: str, expected: list[tuple[np.ndarray, np.ndarray]], tmp_path: Path, compiler: str, flags: tuple[str, ...]
+) -> None:
+    program = compiled(tmp_path, header, "language", compiler=compiler, flags=flags)
+    for name, cells in inputs().items():
+        cells.tofile(tmp_path / name)
+    run(program, str(tmp_path))
+    for number, (floats, ints) in enumerate(expected):
+        name = ENTRIES[number].name
+        made = np.fromfile(tmp_path / f"floats_{number}").reshape(floats.shape)
+        same = (made.view(np.int64) == floats.view(np.int64)) | (np.isnan(made) & np.isnan(floats))
+        assert same.all(), f"{name}: {[(*at, made[tuple(at)], floats[tuple(at)]) for at in np.argwhere(~same)[:5]]}"
+        made = np.fromfile(tmp_path / f"ints_{number}", np.int64).reshape(ints.shape)
+        assert (made == ints).all(), f"{name}: {np.argwhere(made != ints)[:5]}"
+        assert floats.any() or ints.any()
+
+
+def plain(of: object) -> object:
+    """A type without what layout and literals add to it."""
+    of = types.unliteral(of)
+    if is_array(of):
+        return of.dtype, of.ndim
+    return tuple(map(plain, of.types)) if is_tuple(of) else of
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
+def test_variables_have_the_types_that_numba_infers(entry: Entry, expected: list[object]) -> None:
+    """Numba has a variable for each assignment."""
+    ours = Translation().function(entry.kernel, ARGUMENTS, None, None).variables
+    inferred = entry.kernel.overloads[ARGUMENTS].type_annotation.typemap
+    compared = 0
+    for name, found in inferred.items():
+        variable = name.partition(".")[0]
+        if variable in ours:
+            compared += 1
+            assert plain(found) == plain(ours[variable]), name
+    assert compared >= len(ours)

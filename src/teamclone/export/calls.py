@@ -198,12 +198,19 @@ def _where(call: Call) -> Value:
 # ---- Arrays from arrays.
 
 
+def _summed(call: Call, dtype: Any) -> Any:
+    """Return the type of a sum of elements."""
+    if dtype not in (types.boolean, types.int64, types.float32, types.float64):
+        raise call.fail("type", f"a sum of {dtype}: convert it before")
+    return types.int64 if dtype == types.boolean else dtype
+
+
 def _reduction(call: Call, name: str) -> Value:
     call.only(0 if call.base is not None else 1, 1, *(["axis"] if name == "sum" else []))
     value = call.array(call.made()[0])
     dtype = value.type.dtype
     if name == "sum":
-        made = types.int64 if dtype == types.boolean else dtype
+        made = _summed(call, dtype)
         axis = call.word("axis", None)
         if axis is not None:
             if not isinstance(axis, int) or value.type.ndim < 2:
@@ -246,7 +253,7 @@ def _searchsorted(call: Call) -> Value:
 def _cumsum(call: Call) -> Value:
     call.only(0 if call.base is not None else 1, 1)
     value = call.array(call.made()[0], 1)
-    made = types.int64 if value.type.dtype == types.boolean else value.type.dtype
+    made = _summed(call, value.type.dtype)
     return call.new(made, 1, f"rt::running_sum<{SCALARS[made]}>(arena, {value.code})", value)
 
 

@@ -27,6 +27,8 @@ constexpr Int mul(Int a, Int b) { return static_cast<Int>(bits(a) * bits(b)); }
 constexpr std::uint64_t add(std::uint64_t a, std::uint64_t b) { return a + b; }
 constexpr std::uint64_t sub(std::uint64_t a, std::uint64_t b) { return a - b; }
 constexpr std::uint64_t mul(std::uint64_t a, std::uint64_t b) { return a * b; }
+constexpr double add(double a, double b) { return a + b; }
+constexpr float add(float a, float b) { return a + b; }
 constexpr Int neg(Int a) { return static_cast<Int>(-bits(a)); }
 constexpr Int abs(Int a) { return a < 0 ? neg(a) : a; }
 inline double abs(double a) { return std::fabs(a); }
@@ -433,7 +435,7 @@ template <typename T, int N, bool P> constexpr bool any(const View<T, N, P>& of)
 }
 template <typename S, typename T, int N, bool P> constexpr S sum(const View<T, N, P>& of) {
     S made = S(0);
-    each(of, [&made](T value) { made = static_cast<S>(made + static_cast<S>(value)); return true; });
+    each(of, [&made](T value) { made = add(made, static_cast<S>(value)); return true; });
     return made;
 }
 template <typename T, int N, bool P> constexpr Int argmax(const View<T, N, P>& of) {
@@ -483,14 +485,14 @@ template <typename S, int Axis, typename T, int N, bool P> View<S, N - 1> sum_ov
     for (Int index = 0; index < of.shape[static_cast<std::size_t>(Axis)]; ++index) {
         View<T, N - 1, false> layer = first;
         layer.data += index * of.step(Axis);
-        map_into(made, [](S total, T value) { return static_cast<S>(total + static_cast<S>(value)); }, made, layer);
+        map_into(made, [](S total, T value) { return add(total, static_cast<S>(value)); }, made, layer);
     }
     return made;
 }
 template <typename S, typename T, bool P> View<S, 1> running_sum(Arena& arena, const View<T, 1, P>& of) {
     const View<S, 1> made = empty<S, 1>(arena, of.shape);
     S total = S(0);
-    for (Int index = 0; index < of.shape[0]; ++index) made(index) = total = static_cast<S>(total + static_cast<S>(of(index)));
+    for (Int index = 0; index < of.shape[0]; ++index) made(index) = total = add(total, static_cast<S>(of(index)));
     return made;
 }
 
@@ -586,7 +588,7 @@ template <bool Right, typename T, bool P, bool Q> View<Int, 1> searchsorted(Aren
 inline View<Int, 1> arange(Arena& arena, Int start, Int stop, Int step) {
     const Int span = step < 0 ? start - stop : stop - start, stride = abs(step);
     const View<Int, 1> made = empty<Int, 1>(arena, {span <= 0 || stride == 0 ? 0 : (span + stride - 1) / stride});
-    for (Int index = 0; index < made.shape[0]; ++index) made(index) = start + index * step;
+    for (Int index = 0; index < made.shape[0]; ++index) made(index) = add(start, mul(index, step));
     return made;
 }
 inline View<double, 1> linspace(Arena& arena, double start, double stop, Int count) {

@@ -36,10 +36,10 @@ def parts_of(state: State) -> Parts:
 
 @pytest.fixture(scope="module")
 def real(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Parts:
-    """Kicks and tackles of real matches."""
+    """Kicks and tackles of a real match."""
     folder = tmp_path_factory.mktemp("real")
     store = create_store(folder / "store")
-    ingest([samples_dir], store)
+    ingest([samples_dir / "20261122113747-WEBase_1-vs-HELIOS_base_8.rcg.xz"], store)
     build_dataset(DatasetConfig(teams=("HELIOS_base",)), store=store, out=folder / "dataset")
     data = open_dataset(folder / "dataset")
     kind = data.target(range(len(data))).kind

@@ -1,1 +1,1 @@
-"""From the state of the game to the inputs of a network, in compiled kernels: no PyTorch, and nothing of it learns."""
+"""From the state of the game to the inputs of a network and to its answer, in compiled kernels: no PyTorch."""

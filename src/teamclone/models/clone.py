@@ -9,6 +9,7 @@ from typing import Any, cast
 import torch
 from torch import Tensor, nn
 
+from teamclone.engine.network.constants import TARGET_COLUMNS
 from teamclone.models.answer import Answer, Prediction
 from teamclone.models.config import (
     EgocentricConfig,
@@ -24,7 +25,7 @@ from teamclone.models.heads.trunk_output import KickFeatures, TrunkOutput
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.paper import Features, PaperFeatures
 from teamclone.models.layers.players import PlayerEncoder
-from teamclone.models.layers.targets import TARGET_COLUMNS, TargetPoints, layers
+from teamclone.models.layers.targets import TargetPoints, layers
 from teamclone.models.loss import Balance, Loss, ParameterLoss
 from teamclone.world.state import State, Target
 

@@ -11,14 +11,11 @@ from itertools import pairwise
 from typing import ClassVar
 
 from teamclone.engine.inputs.layout import BLOCKS
+from teamclone.engine.network.constants import ACTIVATIONS, ATTENTION_HEADS
 from teamclone.rcss.commands import CLONED, REPERTOIRE, not_of_repertoire
 from teamclone.rcss.player_types import GROUPS
 from teamclone.system.settings import setting, without_effect
 
-ATTENTION_HEADS = 4
-"""Heads of attention in `layers.players.PlayerEncoder`."""
-ACTIVATIONS = ("relu", "gelu", "silu", "tanh")
-"""Hidden activations."""
 PARAMETER_LOSSES = ("paper", "masked")
 """Errors of the parameters that a point head learns by, see `loss.point_loss`."""
 LOSS_SETTINGS = ("parameter_loss", "parameter_weight", "target_weight", "extra_kicks")

@@ -15,19 +15,12 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-DEGREE = math.pi / 180.0
-LEAST_ANGLE = 0.03 * DEGREE
-LEAST_POWER = 0.03
-LEAST_PLACE = 0.03
-"""Smallest scales: agents write arguments to the thousandth, and no density may run away."""
+from teamclone.engine.network.constants import DEGREE, MEDOID_COMPONENTS
+
 LEAST_MASS = 1e-12
 """Below this the probability of all clipped angles counts no less."""
 CLIPPED = 1e-2
 """An argument this close to its bound, in its unit, counts as clipped."""
-
-
-MEDOID_COMPONENTS = 128
-"""Components among which a median is looked for: those with the greatest shares."""
 
 
 class Mixture(NamedTuple):
@@ -140,10 +133,11 @@ def weighted_medoid(logits: Tensor, centre: Tensor, *, angle: bool) -> Tensor:
     if centre.shape[1] > MEDOID_COMPONENTS:
         chosen = logits.topk(MEDOID_COMPONENTS, dim=1).indices
         logits, centre = logits.gather(1, chosen), centre.gather(1, chosen)
-    distance = centre[:, :, None] - centre[:, None, :]
+    # As far from one to the other as back, to the bit: the first of two that are equally near is taken.
+    distance = (centre[:, :, None] - centre[:, None, :]).abs()
     if angle:
-        distance = wrap(distance)
-    return centre.gather(1, _nearest_to_all(logits, distance.abs())).squeeze(1)
+        distance = wrap(distance).abs()
+    return centre.gather(1, _nearest_to_all(logits, distance)).squeeze(1)
 
 
 def weighted_medoid_place(logits: Tensor, x: Tensor, y: Tensor) -> Tensor:

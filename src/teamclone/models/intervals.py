@@ -13,7 +13,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from teamclone.models.distributions import CLIPPED, DEGREE, LEAST_MASS, Mixture, wrap
+from teamclone.engine.network.constants import DEGREE
+from teamclone.models.distributions import CLIPPED, LEAST_MASS, Mixture, wrap
 
 LEAST_WIDTH = 1e-3
 """Units and degrees, far below every scale: by so much intervals are taken as wider, so that none is without width."""

@@ -9,8 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from teamclone.engine.network.constants import ACTIVATIONS
 from teamclone.errors import UsageError
-from teamclone.models.config import ACTIVATIONS, EgocentricTrunkConfig, ModelConfig, of_targets
+from teamclone.models.config import EgocentricTrunkConfig, ModelConfig, of_targets
 from teamclone.search.trials import (
     SETTLED,
     Mode,

@@ -15,9 +15,10 @@ from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.dataset.reader import open_dataset
 from teamclone.export.entries import ENTRIES, MEMORY_BYTES
 from teamclone.export.translate import translate
+from teamclone.planner.columns import PLAN
 from teamclone.planner.kick_sequences import DIRECTIONS, ORDER_FIELDS, PAIRS, kick_order
-from teamclone.planner.plan import PLAN, plan
-from teamclone.planner.scene import COLUMNS, ROWS, scenes
+from teamclone.planner.plan import orders_of, plan_scene
+from teamclone.planner.scene import COLUMNS, ROWS, fill_scene
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.store import create_store
 from teamclone.store.ingest import ingest
@@ -32,6 +33,24 @@ ODD = (0.0, 1.0, -1.0, 1e-300, 1e300, -1e300, 1e9, -1e9, 1e-9, 50.0, -50.0, 180.
 def parts_of(state: State) -> Parts:
     each = state.each()
     return tuple(part.numpy() for part in (each.ball, each.players, each.types, each.server, each.actor))
+
+
+def scenes(ball: np.ndarray, players: np.ndarray, types: np.ndarray, server: np.ndarray) -> np.ndarray:
+    made = np.zeros((len(ball), ROWS, COLUMNS))
+    for index, scene in enumerate(made):
+        fill_scene(ball[index], players[index], types[index], server[index], scene)
+    return made
+
+
+def plans(*parts: np.ndarray) -> np.ndarray:
+    """Return the plans by Numba."""
+    *_, server, actor = parts
+    orders, which = orders_of(server)
+    orders.flags.writeable = False  # as the translation has it
+    made = np.zeros((len(actor), len(PLAN)))
+    for index, scene in enumerate(scenes(*parts[:4])):
+        plan_scene(scene, actor[index], orders[which[index]], made[index])
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +127,7 @@ def planned(program: Path, folder: Path, scene: np.ndarray, parts: Parts, memory
 def assert_equal(program: Path, folder: Path, parts: Parts) -> None:
     """Compare plans of C++ with those of Numba, bit by bit."""
     with np.errstate(all="ignore"):
-        expected = plan(*parts)
+        expected = plans(*parts)
         made, _, overflows = planned(program, folder, scenes(*parts[:4]), parts, MEMORY_BYTES)
     assert overflows == 0
     different = np.flatnonzero((made.view(np.int64) != expected.view(np.int64)).any(1))

@@ -9,9 +9,10 @@ from tests.situations import situations
 from torch import Tensor
 
 from teamclone.engine.inputs.layout import BLOCKS
+from teamclone.engine.network.constants import ACTIVATIONS
 from teamclone.models.answer import Answer
 from teamclone.models.clone import Clone, parameter_count
-from teamclone.models.config import ACTIVATIONS, EgocentricConfig, EgocentricPointConfig, ModelConfig, PaperConfig
+from teamclone.models.config import EgocentricConfig, EgocentricPointConfig, ModelConfig, PaperConfig
 from teamclone.models.heads.mixture import with_ball
 from teamclone.models.loss import Balance, Loss
 from teamclone.rcss.commands import CLONED_KINDS, PARAMETERS, CommandKind

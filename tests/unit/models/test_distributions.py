@@ -9,10 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
+from teamclone.engine.network.constants import DEGREE, LEAST_ANGLE, LEAST_POWER
 from teamclone.models.distributions import (
-    DEGREE,
-    LEAST_ANGLE,
-    LEAST_POWER,
     Mixture,
     angle_terms,
     clipped_terms,

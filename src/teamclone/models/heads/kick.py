@@ -11,42 +11,42 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from teamclone.dynamics.formulas import covered, roll
-from teamclone.engine.inputs.layout import MATES
+from teamclone.engine.network.constants import (
+    AHEAD_M,
+    BALL_COMPONENTS,
+    DRIBBLES,
+    IMPOSSIBLE,
+    LEAD_M,
+    LEAST_ANGLE,
+    LEAST_GAIN,
+    LEAST_POWER,
+    MOST_KICK,
+    N_COMPONENTS,
+    TARGETS,
+    TOUCH_M,
+    TYPICAL_KICK_ANGLE,
+    TYPICAL_KICK_POWER,
+    USUAL_ERROR,
+)
 from teamclone.models import distributions as mixture
-from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, scale_of
+from teamclone.models.distributions import Mixture, scale_of
 from teamclone.models.inputs.geometry import Inputs, geometry_of, mates_of
 from teamclone.planner.columns import WAYS
 from teamclone.rcss import pitch
-
-BALL_COMPONENTS = 3
-"""Components that begin at the ball itself."""
-DRIBBLES = (1, 2, 3, 4, 5, 7, 10)
-"""Cycles after which a dribbler reaches the ball again."""
-LEAD_M = 12.0
-"""Metres from a team mate, the goal's middle or the ball to the target, for an output of 1."""
-TOUCH_M = 3.0
-"""Metres from the dribbler's later place to the target of a dribble, for an output of 1."""
-AHEAD_M = 0.6
-"""Metres in front of a dribbler at which the ball is to be."""
-N_COMPONENTS = MATES + 1 + BALL_COMPONENTS + len(DRIBBLES)
-USUAL_ERROR = 0.003
-"""Metres per cycle between the planned and the real velocity of the ball, before training."""
-IMPOSSIBLE = -30.0
-"""Logit of a way that the plan does not have."""
 
 
 def kick_for(wanted: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor]:
     """Return power and direction of the kicks that give the ball a velocity.
 
-    Power is at most 150; directions are radians from the body.
+    Power is at most MOST_KICK; directions are radians from the body.
 
     Args:
         wanted: (batch, components, 2) metres per cycle on the pitch.
     """
     vx, vy, cos, sin, gain = geometry_of(geometry, "ball_vx", "ball_vy", "cos", "sin", "kick_gain")
     x, y = wanted[..., 0] - vx, wanted[..., 1] - vy
-    power = torch.sqrt(x.square() + y.square() + 1e-6) / gain.clamp(min=5e-3)
-    return power.clamp(max=150.0), torch.atan2(y * cos - x * sin, x * cos + y * sin)
+    power = torch.sqrt(x.square() + y.square() + 1e-6) / gain.clamp(min=LEAST_GAIN)
+    return power.clamp(max=MOST_KICK), torch.atan2(y * cos - x * sin, x * cos + y * sin)
 
 
 class Planned(nn.Module):
@@ -68,7 +68,7 @@ class Planned(nn.Module):
             ways, geometry = inputs.ways, inputs.geometry
             logits = torch.where(ways[..., 0] > 0, share, IMPOSSIBLE)
             power, angle = kick_for(ways[..., 1:], geometry)
-            gain = geometry_of(geometry, "kick_gain")[0].clamp(min=5e-3)
+            gain = geometry_of(geometry, "kick_gain")[0].clamp(min=LEAST_GAIN)
             error = USUAL_ERROR * self.error.exp()
             return (
                 Mixture(logits, power, LEAST_POWER + error / gain),
@@ -116,7 +116,7 @@ class KickMixture(nn.Module):
         raw = self.layer(hidden).float().view(-1, 6, N_COMPONENTS)
         if self.target is not None and targets is not None:
             # The components begin with the team mates and the goal.
-            raw = raw + functional.pad(self.target(targets).float().transpose(1, 2), (0, N_COMPONENTS - MATES - 1))
+            raw = raw + functional.pad(self.target(targets).float().transpose(1, 2), (0, N_COMPONENTS - TARGETS))
         with torch.autocast(hidden.device.type, enabled=False):
             logits, ahead, aside, speed, power_scale, angle_scale = raw.unbind(1)
             aimed = N_COMPONENTS - len(DRIBBLES)
@@ -129,8 +129,8 @@ class KickMixture(nn.Module):
             )
             power, angle = kick_for(wanted, geometry)
             return (
-                Mixture(logits, power, scale_of(power_scale, least=LEAST_POWER, typical=5.0)),
-                Mixture(logits, angle, scale_of(angle_scale, least=LEAST_ANGLE, typical=6 * DEGREE)),
+                Mixture(logits, power, scale_of(power_scale, least=LEAST_POWER, typical=TYPICAL_KICK_POWER)),
+                Mixture(logits, angle, scale_of(angle_scale, least=LEAST_ANGLE, typical=TYPICAL_KICK_ANGLE)),
             )
 
     def _aimed(self, ahead: Tensor, aside: Tensor, speed: Tensor, geometry: Tensor) -> Tensor:

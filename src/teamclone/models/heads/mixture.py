@@ -9,14 +9,30 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from teamclone.engine.network.constants import (
+    CATCH_DIRECTIONS,
+    CATCH_EDGE_DEG,
+    CATCH_LIMIT_DEG,
+    DASH_DIRECTIONS,
+    DASH_REACH,
+    DEGREE,
+    FREE_COMPONENTS,
+    FREE_HALF_TURNS,
+    INCOMES,
+    LEAST_ANGLE,
+    LEAST_PLACE,
+    LEAST_POWER,
+    MOVE_PLACES,
+    MOVE_REACH_M,
+    TURN_REACH,
+    TYPICAL_DASH,
+    TYPICAL_PLACE,
+    TYPICAL_TURN,
+)
 from teamclone.models import distributions as mixture
 from teamclone.models import intervals
 from teamclone.models.answer import Answer, Prediction
 from teamclone.models.distributions import (
-    DEGREE,
-    LEAST_ANGLE,
-    LEAST_PLACE,
-    LEAST_POWER,
     Mixture,
     class_of,
     direction_of,
@@ -33,24 +49,8 @@ from teamclone.rcss import pitch
 from teamclone.rcss.commands import CLONED
 from teamclone.world.state import Target
 
-INCOMES = 6
-"""Components of dash power that are a learned multiple of what the player recovers in a cycle."""
-FREE_COMPONENTS = 4
-"""Components of dash power and turn moment that hang on nothing."""
-DASH_DIRECTIONS = 24
-"""Classes of dash direction, 15 degrees apart."""
 TACKLE_DIRECTIONS = tackling.DIRECTIONS
 """Classes of tackle direction, 9 degrees apart."""
-CATCH_DIRECTIONS = 40
-"""Classes of catch direction, 9 degrees apart."""
-CATCH_EDGE_DEG = 22.6
-"""Angle from the middle of the catch area to its far corners, 1.2 m ahead and 0.5 m aside."""
-CATCH_LIMIT_DEG = 90.0
-"""To which the server clips the direction of a catch (since version 17)."""
-MOVE_PLACES = tuple((x, y) for x in (-45.0, -30.0, -15.0, -5.0) for y in (-12.0, 12.0))
-"""Where the components of a move begin to learn, metres: places of the own half."""
-MOVE_REACH_M = 10.0
-"""How far from there one goes for an output of 1."""
 WITH_BALL = CLONED.index("kick"), CLONED.index("tackle")
 """Classes whose parameters the layers of a kick find."""
 TARGET_SCALE_DEG = 4.0
@@ -267,21 +267,28 @@ class MixtureHead(nn.Module):
         free = self.powers.expand(raw.shape[0], -1)
         wanted = [situation.power.detach().clamp(-20, 120), income * self.incomes, free]
         return Mixture(
-            logits, torch.cat(wanted, 1) + 5 * shift, mixture.scale_of(scale, least=LEAST_POWER, typical=3.0)
+            logits,
+            torch.cat(wanted, 1) + DASH_REACH * shift,
+            mixture.scale_of(scale, least=LEAST_POWER, typical=TYPICAL_DASH),
         )
 
     def _turn(self, raw: Tensor, situation: TrunkOutput) -> tuple[Mixture, Mixture]:
         """Return the turn, and the turn by the target points alone."""
         logits, shift, scale = raw.chunk(3, 1)
         to_ball, to_meet = geometry_of(situation.geometry, "turn_to_ball", "turn_to_meet")
-        free = torch.linspace(-0.75, 0.75, FREE_COMPONENTS, device=raw.device).expand(raw.shape[0], -1) * torch.pi
+        free = (
+            torch.linspace(-FREE_HALF_TURNS, FREE_HALF_TURNS, FREE_COMPONENTS, device=raw.device).expand(
+                raw.shape[0], -1
+            )
+            * torch.pi
+        )
         centre = torch.cat([to_ball, to_meet, situation.bearing, free], 1)
         # Only the free ones go far from where they begin.
-        reach = torch.cat([torch.full_like(centre[:, :-FREE_COMPONENTS], 0.05), torch.ones_like(free)], 1)
+        reach = torch.cat([torch.full_like(centre[:, :-FREE_COMPONENTS], TURN_REACH), torch.ones_like(free)], 1)
         turn = Mixture(
             logits,
             wrap(centre.detach() + reach * shift),
-            mixture.scale_of(scale, least=LEAST_ANGLE, typical=2 * DEGREE),
+            mixture.scale_of(scale, least=LEAST_ANGLE, typical=TYPICAL_TURN),
         )
         width = torch.full_like(centre, TARGET_SCALE_DEG * DEGREE)
         return turn, Mixture(logits.detach(), wrap(centre), width)
@@ -305,7 +312,7 @@ class MixtureHead(nn.Module):
             return None
         logits, *raw = self.move(situation.parameters.float()).chunk(5, 1)
         x, y = (base + MOVE_REACH_M * shift for base, shift in zip(self.places.T, raw[:2], strict=True))
-        x_scale, y_scale = (mixture.scale_of(scale, least=LEAST_PLACE, typical=2.0) for scale in raw[2:])
+        x_scale, y_scale = (mixture.scale_of(scale, least=LEAST_PLACE, typical=TYPICAL_PLACE) for scale in raw[2:])
         return Move(Mixture(logits, x, x_scale), Mixture(logits, y, y_scale))
 
     def kick_answers(self, seen: KickFeatures) -> tuple[KickAnswer, KickAnswer]:

@@ -14,19 +14,16 @@ from torch import Tensor, nn
 
 from teamclone.dynamics.formulas import cycles_over
 from teamclone.engine.inputs.layout import MATES, OTHER, OTHERS
-from teamclone.models.config import ATTENTION_HEADS
+from teamclone.engine.network.constants import (
+    ATTENTION_HEADS,
+    NEVER_CYCLES,
+    PASS_SPEED,
+    PLAYER_COLUMNS,
+    RUN_SPEED,
+)
 from teamclone.models.inputs.geometry import Inputs, geometry_of
 from teamclone.rcss import pitch
 
-PLAYER_COLUMNS = 17
-"""Inputs of each: `PlayerEncoder.columns`."""
-TARGETS = MATES + 1
-"""Places to kick to: the team mates, then the goal."""
-PASS_SPEED = 2.7
-"""Ball speed of a hard pass, metres per cycle."""
-RUN_SPEED = 0.9
-"""Speed of a running opponent, metres per cycle."""
-NEVER_CYCLES = 20.0
 _THERE = OTHER.index("there")
 
 

@@ -15,13 +15,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from teamclone.engine.network.constants import PLACE_X, PLACE_Y, TURN_DEG
 from teamclone.models.inputs.geometry import geometry_of
-from teamclone.rcss import pitch
-
-TARGET_COLUMNS = 10
-"""Inputs that each place gives."""
-TURN_DEG = 15.0
-"""Agents of the league dash without a turn at targets closer to straight ahead."""
 
 
 def layers(widths: Sequence[int], activation: type[nn.Module], dropout: float = 0.0) -> nn.Sequential:
@@ -52,9 +47,7 @@ class TargetPoints(nn.Module):
             return
         self.body = layers((width, *hidden), activation)
         self.place = nn.Linear((width, *hidden)[-1], 2 * count)
-        self.register_buffer(
-            "scale", torch.tensor([0.75 * pitch.HALF_LENGTH, 0.75 * pitch.HALF_WIDTH]), persistent=False
-        )
+        self.register_buffer("scale", torch.tensor([PLACE_X, PLACE_Y]), persistent=False)
 
     def forward(self, context: Tensor, geometry: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return the inputs of the places, and the bearing and dash power to each.

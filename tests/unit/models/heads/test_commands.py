@@ -12,10 +12,11 @@ from tests.situations import situations
 from torch import Tensor
 from torch.utils._pytree import tree_map
 
+from teamclone.engine.network.constants import CATCH_DIRECTIONS, CATCH_EDGE_DEG
 from teamclone.models.clone import Clone
 from teamclone.models.config import EgocentricConfig, ModelConfig, PaperConfig
 from teamclone.models.heads.ensemble import EnsembleAnswer
-from teamclone.models.heads.mixture import CATCH_DIRECTIONS, CATCH_EDGE_DEG, MixtureAnswer, MixtureHead
+from teamclone.models.heads.mixture import MixtureAnswer, MixtureHead
 from teamclone.rcss.commands import CLONED, PARAMETERS, REPERTOIRE, parameters_of
 from teamclone.rcss.pitch import MAX_X, MAX_Y
 from teamclone.world.channels import CHANNEL

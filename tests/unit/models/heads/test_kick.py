@@ -12,20 +12,23 @@ from benchmarks.kicks import plans
 from tests.situations import situations
 
 from teamclone.engine.inputs.layout import GEOMETRY, MATES
-from teamclone.models.clone import Clone
-from teamclone.models.config import EgocentricConfig
-from teamclone.models.distributions import DEGREE, LEAST_ANGLE, LEAST_POWER, Mixture, wrap
-from teamclone.models.heads.kick import (
+from teamclone.engine.network.constants import (
     AHEAD_M,
     BALL_COMPONENTS,
+    DEGREE,
     DRIBBLES,
     IMPOSSIBLE,
     LEAD_M,
+    LEAST_ANGLE,
+    LEAST_POWER,
     N_COMPONENTS,
     TOUCH_M,
     USUAL_ERROR,
-    KickMixture,
 )
+from teamclone.models.clone import Clone
+from teamclone.models.config import EgocentricConfig
+from teamclone.models.distributions import Mixture, wrap
+from teamclone.models.heads.kick import KickMixture
 from teamclone.models.heads.mixture import TACKLE_DIRECTIONS, MixtureHead, class_of
 from teamclone.models.inputs.geometry import InputLayout, Inputs
 from teamclone.planner.columns import PLAN, WAYS

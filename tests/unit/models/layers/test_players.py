@@ -9,9 +9,10 @@ import torch
 from tests.situations import situations
 
 from teamclone.engine.inputs.layout import MATES, OTHER, OTHERS
+from teamclone.engine.network.constants import PLAYER_COLUMNS, RUN_SPEED, TARGETS
 from teamclone.models.inputs.egocentric import EgocentricFeatures
 from teamclone.models.inputs.geometry import Inputs
-from teamclone.models.layers.players import PLAYER_COLUMNS, RUN_SPEED, TARGETS, PlayerEncoder
+from teamclone.models.layers.players import PlayerEncoder
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
 from teamclone.world.state import State
 

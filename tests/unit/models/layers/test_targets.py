@@ -7,8 +7,9 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.engine.inputs.layout import GEOMETRY
+from teamclone.engine.network.constants import TARGET_COLUMNS
 from teamclone.models.inputs.geometry import geometry_of
-from teamclone.models.layers.targets import TARGET_COLUMNS, TargetPoints, layers
+from teamclone.models.layers.targets import TargetPoints, layers
 
 SCALE = (0.75 * 52.5, 0.75 * 34.0)
 

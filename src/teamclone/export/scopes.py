@@ -11,7 +11,7 @@ from typing import Any
 
 from teamclone.export.constants import clean
 from teamclone.export.rules import Problem, RejectedError
-from teamclone.export.values import Value, joined
+from teamclone.export.values import Value, is_array, joined
 
 IGNORED = "_"
 """The name of what is not used."""
@@ -181,8 +181,8 @@ class Scope:
             self.known[name], self.roots[name], self.settled = after, roots, False
 
     def change(self, node: ast.AST, array: Value) -> None:
-        """Note that an array is changed."""
-        if not array.type.mutable:
+        """Note that an array, or one within a tuple, is changed."""
+        if is_array(array.type) and not array.type.mutable:
             raise self.fail(node, "constant", f"{array.code} is read-only")
         if not array.roots <= self.writes:
             self.writes |= array.roots

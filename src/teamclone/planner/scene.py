@@ -86,7 +86,7 @@ def _fill_player(player: Array, channels: Array, of_type: Array, server: Array) 
     player[PRESENT], player[GOALKEEPER] = (flags & FLAG_ON_FIELD) != 0, (flags & FLAG_GOALIE) != 0
     player[FROZEN] = (flags & FLAG_TACKLING) != 0
     if player[PRESENT] == 0:
-        player[X] = player[Y] = FAR_AWAY_M
+        player[X], player[Y] = FAR_AWAY_M, FAR_AWAY_M
     for index in range(len(_FIELDS)):
         player[_FIELDS[index][0]] = of_type[_FIELDS[index][1]]
     player[PAUSE] = player[FROZEN] * math.trunc(PAUSE_PART * server[TACKLE_CYCLES])

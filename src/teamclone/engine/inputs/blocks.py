@@ -98,6 +98,7 @@ _MODE_COLUMN = np.where(
     SITUATION < SIDED_SITUATION, SITUATION, 2 * SITUATION - SIDED_SITUATION + (RESTARTS < 0)
 ).astype(np.int64)
 """(256,) the MODES column of a play mode: a Situation without a side, or one and the side that restarts, own first."""
+_STATES = (FLAG_TACKLING, FLAG_CHARGED, FLAG_COLLIDED)
 _KICK = int(CommandKind.KICK)
 _X, _Y, _VX, _VY, _BODY, _STAMINA, _LAST = (
     CHANNEL[name] for name in ("x", "y", "vx", "vy", "body", "stamina", "last_command")
@@ -182,9 +183,9 @@ def put_self(frame: Frame, view: Look, out: Out, at: int) -> int:
         me[CAPACITY] / max(server[_CAPACITY], 1.0),
     )
     at = put(out, at, stamina_columns)
-    for index, flag in enumerate((FLAG_TACKLING, FLAG_CHARGED, FLAG_COLLIDED)):
-        out[at + index] = (flags & flag) != 0
-    return at + 3
+    for index in range(len(_STATES)):
+        out[at + index] = (flags & _STATES[index]) != 0
+    return at + len(_STATES)
 
 
 @kernel
@@ -244,7 +245,8 @@ def put_ball(frame: Frame, view: Look, out: Out, at: int) -> int:
     velocity = along(ball[VX], ball[VY], view.cos, view.sin)
     lacks, lacks_next = math.hypot(now[0], now[1]) - area, math.hypot(ahead[0], ahead[1]) - area
     turn = math.degrees(math.atan2(ahead[1], ahead[0]))
-    at = put_polar(out, put_polar(out, at, now), ahead)
+    at = put_polar(out, at, now)
+    at = put_polar(out, at, ahead)
     at = put(out, at, (velocity[0], velocity[1], math.hypot(velocity[0], velocity[1])))
     columns = (
         clamp(lacks, -0.5, 0.5) * 4,
@@ -468,7 +470,8 @@ def _put_side(frame: Frame, order: Order, most: int, out: Out, at: int) -> int:
 @kernel
 def put_others(frame: Frame, view: Look, out: Out, at: int) -> int:
     """Write OTHER of all OTHERS; zeros where one is missing."""
-    return _put_side(frame, view.opponents, N_TEAM, out, _put_side(frame, view.mates, MATES, out, at))
+    at = _put_side(frame, view.mates, MATES, out, at)
+    return _put_side(frame, view.opponents, N_TEAM, out, at)
 
 
 @kernel

@@ -22,6 +22,10 @@ OWN, MATE, MATE_2, THEIRS, THEIRS_2, FIRST, MOMENTS = range(7)
 """Places of ``Look.moments``: cycles to the ball of the actor, the first two of each side, and the first of all."""
 
 
+_MEETS = (OWN, MATE, THEIRS, FIRST)
+"""The moments of the meetings."""
+
+
 class Order(NamedTuple):
     """Players of one side, the nearest first.
 
@@ -130,8 +134,8 @@ def _meet(frame: Frame, steps: Array, path: Array, actor: int) -> tuple[Array, A
     moments[MATE], moments[MATE_2] = _first_two(frame.scene, steps, (0, OPPONENT), actor)
     moments[THEIRS], moments[THEIRS_2] = _first_two(frame.scene, steps, (OPPONENT, BALL), actor)
     moments[FIRST] = min(moments[OWN], moments[MATE], moments[THEIRS])
-    for place, moment in enumerate((OWN, MATE, THEIRS, FIRST)):
-        meetings[place, 0], meetings[place, 1] = _place_after(path, moments[moment])
+    for place in range(MEETINGS):
+        meetings[place, 0], meetings[place, 1] = _place_after(path, moments[_MEETS[place]])
     for row in range(OPPONENT):
         rank += frame.scene[row, PRESENT] > 0 and row != actor and steps[row] < moments[OWN]
     return moments, meetings, rank

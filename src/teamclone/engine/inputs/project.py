@@ -95,6 +95,36 @@ def fill_rest(frames: Frames, index: int, frame: Frame, view: Look, places: Plac
         blocks.put_mode(flags, frames.mode[index], frames.mode_cycles[index], out, places[MODE])
 
 
+@kernel
+def plan_near(frame: Frame, actor: int, order: NDArray[np.int64], planned: Array) -> bool:
+    """Fill (len(PLAN),) the plan of an actor, and return whether it may reach the ball with a kick or a tackle."""
+    planned[:] = 0.0
+    near = blocks.near_the_ball(frame, actor)
+    if near:
+        plan_scene(frame.scene.copy(), actor, order, planned)
+    return near
+
+
+@kernel
+def fill_inputs(
+    frames: Frames, index: int, frame: Frame, actor: int, order: NDArray[np.int64], places: Places, out: blocks.Out
+) -> bool:
+    """Fill the inputs of an actor, and return whether it may reach the ball with a kick or a tackle.
+
+    Args:
+        index: of the frame among ``frames``; ``frame`` is filled with it, see `frame.fill_frame`.
+        order: see `kick_sequences.kick_order`. places: see `layout.places`.
+    """
+    planned = np.zeros(len(PLAN))
+    near = blocks.near_the_ball(frame, actor)
+    if places[PLAN_SEEN] >= 0:
+        near = plan_near(frame, actor, order, planned)
+    view = look(frame, actor)
+    fill_actor(frame, view, planned, places, out)
+    fill_rest(frames, index, frame, view, places, out)
+    return near
+
+
 def _compiled() -> Any:
     """Return a kernel that fills the inputs of many samples."""
     version = version_of(inputs, planner, rcss, channels, compiling)
@@ -107,23 +137,20 @@ def _compiled() -> Any:
         which: NDArray[np.int64],
         places: Places,
         out: NDArray[np.float32],
+        near: NDArray[np.bool_],
         plans: Array,
     ) -> int:
-        frame, planned, now = new_frame(), np.zeros(len(PLAN)), -1
+        frame, now = new_frame(), -1
         for sample in range(len(samples)):
             row, index, actor = samples[sample, 0], samples[sample, 1], samples[sample, 2]
             if index != now:
                 fill_frame(frame, frames.ball[index], frames.players[index], frames.types[index], frames.server[index])
                 now = index
-            planned[:] = 0.0
-            if places[PLAN_SEEN] >= 0 and blocks.near_the_ball(frame, actor):
-                plan_scene(frame.scene.copy(), actor, orders[which[index]], planned)
+            order = orders[which[index]]
             if len(plans):
-                plans[row] = planned
-                continue
-            view = look(frame, actor)
-            fill_actor(frame, view, planned, places, out[row])
-            fill_rest(frames, index, frame, view, places, out[row])
+                plan_near(frame, actor, order, plans[row])
+            else:
+                near[row] = fill_inputs(frames, index, frame, actor, order, places, out[row])
         return version
 
     return project_all
@@ -135,8 +162,8 @@ tell_when_compiled({_project_all: "compiling the inputs of the network, once (ab
 
 def project(
     frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64], places: Sequence[int], columns: int
-) -> NDArray[np.float32]:
-    """Return (n, columns) inputs of samples, before normalisation.
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return (n, columns) inputs of samples, before normalisation, and (n,) which of the actors are near the ball.
 
     Args:
         frames: with the frames before, if they are asked for. frame: (n,) of each sample. actor: (n,) 0..10.
@@ -150,9 +177,10 @@ def project(
             f"expected a state with {PAST_FRAMES} frames before it, got {frames.past_known.shape[1]}; "
             "ask for them: dataset.state(rows, history=model.inputs.history)"
         )
-    out = np.empty((len(frame), columns), np.float32)
-    _run(frames, frame, actor, places, out, np.empty((0, len(PLAN))))
-    return out
+    out, near = np.empty((len(frame), columns), np.float32), np.empty(len(frame), np.bool_)
+    if len(frame):
+        _project_all(*_arguments(frames, frame, actor), np.array(places), out, near, np.empty((0, len(PLAN))))
+    return out, near
 
 
 def plans(frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64]) -> Array:
@@ -161,22 +189,14 @@ def plans(frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64]) ->
     Arguments are those of `project`; no frames before are needed.
     """
     made = np.empty((len(frame), len(PLAN)))
-    only_plan = [0 if name == "plan" else -1 for name in PARTS]
-    _run(frames, frame, actor, only_plan, np.empty((0, 0), np.float32), made)
+    if len(frame):
+        nothing = np.empty(0, np.int64), np.empty((0, 0), np.float32), np.empty(0, np.bool_)
+        _project_all(*_arguments(frames, frame, actor), *nothing, made)
     return made
 
 
-def _run(
-    frames: Frames,
-    frame: NDArray[np.int64],
-    actor: NDArray[np.int64],
-    places: Sequence[int],
-    out: NDArray[np.float32],
-    plans: Array,
-) -> None:
-    """Call the kernel: it fills ``plans``, and nothing else, where there is room in it."""
-    if len(frame):
-        frames = Frames(*(np.ascontiguousarray(part, kind) for part, kind in zip(frames, _KINDS, strict=True)))
-        order = np.argsort(frame, kind="stable")
-        samples = np.stack([order, frame[order], actor[order]], axis=1)
-        _project_all(frames, samples, *orders_of(frames.server), np.array(places), out, plans)
+def _arguments(frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64]) -> tuple[Any, ...]:
+    """Return the first arguments of the kernel: samples in the order of their frames, so that each is filled once."""
+    frames = Frames(*(np.ascontiguousarray(part, kind) for part, kind in zip(frames, _KINDS, strict=True)))
+    order = np.argsort(frame, kind="stable")
+    return frames, np.stack([order, frame[order], actor[order]], axis=1), *orders_of(frames.server)

@@ -2,40 +2,36 @@
 
 from __future__ import annotations
 
-import zlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from teamclone import planner
+from teamclone.engine import network
 from teamclone.engine.inputs import layout
 from teamclone.engine.network.answer import answer
 from teamclone.engine.network.draw import UNIFORMS, likeliest, sample
 from teamclone.engine.network.result import Answer, view
 from teamclone.engine.network.spec import INPUTS, N_OUT, Floats, Ints
 from teamclone.engine.network.weights import Weights
-from teamclone.planner import scene
 from teamclone.planner.scene import Array
 from teamclone.rcss import commands, pitch
-from teamclone.system.compiling import tell_when_compiled
+from teamclone.system import compiling
+from teamclone.system.compiling import cached_kernel, tell_when_compiled, version_of
 
 
 def _compiled() -> tuple[Any, Any]:
     """Return kernels that answer many inputs, and that draw commands from many answers."""
-    # Numba keeps what it compiled as long as the file of this function stays the same. It depends on all of these.
-    elsewhere = (Path(str(module.__file__)) for module in (layout, scene, commands, pitch))
-    sources = (*sorted(Path(__file__).parent.glob("*.py")), *elsewhere)
-    version = zlib.crc32(b"".join(path.read_bytes() for path in sources))
+    version = version_of(network, layout, planner, commands, pitch, compiling)
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @cached_kernel(nogil=True, error_model="numpy")
     def answer_all(values: Floats, spec: Ints, packed: Floats, with_ball: NDArray[np.bool_], out: Floats) -> int:
         for index in range(len(packed)):
             answer(values, spec, packed[index], with_ball[index], out[index])
         return version
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @cached_kernel(nogil=True, error_model="numpy")
     def sample_all(spec: Ints, out: Floats, uniforms: Array, drawn: Ints, numbers: Array) -> int:
         for index in range(len(out)):
             drawn[index] = sample(spec, out[index], uniforms[index], numbers[index])

@@ -112,7 +112,8 @@ class EgocentricFeatures(nn.Module):
 def _made(state: Sequence[Tensor], places: Sequence[int], columns: int) -> Tensor:
     """Return (batch, columns) inputs of a state, on its device and of its type."""
     *frames, frame, actor = (part.cpu().numpy() for part in state)
-    return torch.from_numpy(project(Frames(*frames), frame, actor, places, columns)).to(state[0])
+    made, _ = project(Frames(*frames), frame, actor, places, columns)
+    return torch.from_numpy(made).to(state[0])
 
 
 @torch.library.custom_op("teamclone::inputs", mutates_args=())

@@ -21,6 +21,10 @@ def frames(n: int) -> tuple[Frames, NDArray[np.int64], NDArray[np.int64]]:
     return Frames(*parts), frame, actor
 
 
+def inputs(made: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64]) -> NDArray[np.float32]:
+    return project(made, frame, actor, PLACES, COLUMNS)[0]
+
+
 def test_parts_lie_one_after_the_other() -> None:
     begins, columns = places(("past", "self"), others=False)
     there = {name: at for name, at in zip(PARTS, begins, strict=True) if at >= 0}
@@ -32,13 +36,13 @@ def test_parts_lie_one_after_the_other() -> None:
 def test_samples_may_come_in_any_order_and_share_frames() -> None:
     made, frame, _ = frames(40)
     frame, actor = np.repeat(frame, 11), np.tile(np.arange(11), 40)
-    whole = project(made, frame, actor, PLACES, COLUMNS)
+    whole = inputs(made, frame, actor)
     assert np.isfinite(whole).all()
     order = np.random.default_rng(0).permutation(len(frame))
-    assert (project(made, frame[order], actor[order], PLACES, COLUMNS) == whole[order]).all()
+    assert (inputs(made, frame[order], actor[order]) == whole[order]).all()
     for row in (0, 17, 250):
         alone = Frames(*(part[frame[row]][None] for part in made))
-        assert (project(alone, np.zeros(1, np.int64), actor[row : row + 1], PLACES, COLUMNS) == whole[row]).all()
+        assert (inputs(alone, np.zeros(1, np.int64), actor[row : row + 1]) == whole[row]).all()
 
 
 def test_each_match_is_planned_by_its_own_server() -> None:
@@ -54,7 +58,7 @@ def test_each_match_is_planned_by_its_own_server() -> None:
 
 def test_no_samples_give_no_inputs() -> None:
     made, frame, actor = frames(1)
-    assert project(made, frame[:0], actor[:0], PLACES, COLUMNS).shape == (0, COLUMNS)
+    assert inputs(made, frame[:0], actor[:0]).shape == (0, COLUMNS)
     assert plans(made, frame[:0], actor[:0]).shape == (0, len(PLAN))
 
 
@@ -62,18 +66,18 @@ def test_frames_before_have_to_be_there() -> None:
     made, frame, actor = frames(2)
     short = made._replace(**{name: getattr(made, name)[:, :1] for name in ("past_ball", "past_players", "past_known")})
     with pytest.raises(ValueError, match="expected a state with 3 frames before it, got 1"):
-        project(short, frame, actor, PLACES, COLUMNS)
+        inputs(short, frame, actor)
 
 
 def test_arrays_of_any_type_and_order_in_memory_will_do() -> None:
     made, frame, actor = frames(5)
-    whole = project(made, frame, actor, PLACES, COLUMNS)
+    whole = inputs(made, frame, actor)
     other = made._replace(
         players=np.asfortranarray(made.players.astype(np.float64)),
         server=np.broadcast_to(made.server[:1], made.server.shape),
         mode_cycles=made.mode_cycles.astype(np.int64),
     )
-    assert (project(other, frame, actor, PLACES, COLUMNS) == whole).all()
+    assert (inputs(other, frame, actor) == whole).all()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1e30, 3e9])
@@ -82,4 +86,4 @@ def test_whatever_a_log_may_hold_ends_in_numbers_of_the_right_shape(value: float
     for channel in CHANNEL.values():
         players = made.players.copy()
         players[:, ::3, channel] = value
-        assert project(made._replace(players=players), frame, actor, PLACES, COLUMNS).shape == (30, COLUMNS)
+        assert inputs(made._replace(players=players), frame, actor).shape == (30, COLUMNS)

@@ -73,6 +73,7 @@ MATH: Mapping[Any, str] = {
     math.log2: "std::log2",
     math.log10: "std::log10",
     math.tanh: "std::tanh",
+    math.atanh: "std::atanh",
     math.erf: "std::erf",
     math.lgamma: "std::lgamma",
     math.sinh: "std::sinh",

@@ -24,8 +24,8 @@ from teamclone.export.values import has_arrays
 
 MOST_PASSES = 10
 """Passes over a kernel after which its types have to be found."""
-INCLUDES = ("array", "cmath", "csetjmp", "cstddef", "cstdint", "cstdio", "cstdlib", "limits", "tuple", "type_traits",
-            "utility")  # fmt: skip
+INCLUDES = ("array", "cmath", "csetjmp", "cstddef", "cstdint", "cstdio", "cstdlib", "cstring", "limits", "memory",
+            "new", "tuple", "type_traits", "utility")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,11 +178,12 @@ def check_kernels(entries: Sequence[Entry]) -> list[Problem]:
     return program.problems
 
 
-def translate(entries: Sequence[Entry], *, version: str) -> str:
+def translate(entries: Sequence[Entry], *, version: str, more: str = "") -> str:
     """Return the header with some kernels and all that they call.
 
     Args:
         version: the name of the namespace within `teamclone`, so that two versions can be in one program.
+        more: C++ that stands after them in the namespace.
 
     Raises:
         KernelError: for a kernel that cannot be translated.
@@ -213,6 +214,7 @@ def translate(entries: Sequence[Entry], *, version: str) -> str:
         *grouped((module, [*block, ""]) for (module, _), block in program.constants.defined.items()),
         *grouped(bodies),
         *(line for pair in zip(entries, functions, strict=True) for line in _entry(*pair, program.constants)),
+        *more.splitlines(),
         f"}}  // namespace {version}",
         "}  // namespace teamclone",
         "",

@@ -10,9 +10,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from teamclone.engine.inputs.paper import fields
 from teamclone.engine.network import spec as of
 from teamclone.engine.network.constants import ACTIVATIONS
-from teamclone.engine.network.spec import Ints, Shape, size_of, spec_of
+from teamclone.engine.network.spec import EGOCENTRIC, PAPER, Ints, Shape, size_of, spec_of
 from teamclone.engine.network.weights import Weights
 from teamclone.errors import RunError
 from teamclone.models.clone import Clone, EgocentricTrunk, Trunks, model_id
@@ -21,6 +22,8 @@ from teamclone.models.heads.ensemble import EnsembleHead
 from teamclone.models.heads.mixture import MixtureHead
 from teamclone.models.heads.point import PointHead
 from teamclone.models.inputs.egocentric import CLIP, EgocentricFeatures
+from teamclone.models.inputs.paper import PaperFeatures
+from teamclone.planner.kick_sequences import DEFAULT_RULES, kick_order
 from teamclone.rcss.commands import parameters_of
 
 
@@ -50,7 +53,21 @@ def pack(model: Clone) -> Weights:
             if len(made) != size:
                 raise AssertionError(f"row at {row}: {len(made)} values, {size} expected")
             values[first : first + size] = made
-    return Weights(spec=spec, values=values, model_id=model_id(model))
+    return Weights(
+        spec=spec,
+        values=values,
+        model_id=model_id(model),
+        inputs=_inputs(model.features),
+        order=kick_order(DEFAULT_RULES).reshape(-1).astype(np.uint8) if shape.ways else np.empty(0, np.uint8),
+    )
+
+
+def _inputs(features: PaperFeatures | EgocentricFeatures) -> Ints:
+    """Return how the kernels make the inputs, see `Weights`."""
+    if isinstance(features, EgocentricFeatures):
+        return np.array([EGOCENTRIC, *features.places], np.int64)
+    of_types = (() if part is None else part.names for part in (features.own_type, features.all_types))
+    return np.concatenate([[PAPER], fields(*of_types)])
 
 
 def _shape(model: Clone) -> Shape:

@@ -46,7 +46,7 @@ from teamclone.planner.scene import (
     turned,
 )
 from teamclone.rcss.player_types import DEFAULTS
-from teamclone.rcss.server_params import SERVER_FIELD
+from teamclone.rcss.server_params import SERVER_DEFAULTS, SERVER_FIELD
 from teamclone.system.compiling import kernel
 
 Ints = NDArray[np.int64]
@@ -63,6 +63,8 @@ DIRECTIONS, PAIRS = 72, 1024
 """Directions of the last kick of three, and how many pairs of places before it are tried."""
 ORDER_FIELDS = tuple(SERVER_FIELD[name] for name in ("ball_size", "maxpower", "ball_accel_max", "ball_speed_max"))
 """Columns of the server that `kick_order` goes by."""
+DEFAULT_RULES = tuple(SERVER_DEFAULTS[list(ORDER_FIELDS)].tolist())
+"""Their values on a server that nobody has changed."""
 THIN_M, ALIKE = 0.1, 1e-3
 """Metres by which the rings of the order have a smaller margin; speeds so near to each other count as one there."""
 SECOND_PART = 0.9

@@ -19,8 +19,9 @@ from torch import Tensor
 
 from teamclone.dataset.layout import CATEGORICAL_INDEX, MEASURED_INDEX, MISSING, STEPS
 from teamclone.dataset.reader import Dataset
+from teamclone.engine.inputs.paper import BODY_LIMIT_DEG
 from teamclone.errors import DatasetError
-from teamclone.models.inputs.paper import BODY_LIMIT_DEG, PaperFeatures, TypeParameters, logged_ball_speed_max
+from teamclone.models.inputs.paper import PaperFeatures, TypeParameters, logged_ball_speed_max
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.players import N_PLAYERS

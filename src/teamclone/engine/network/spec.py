@@ -16,7 +16,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.engine.inputs.layout import GEOMETRY, OTHER, OTHERS, TACKLE
+from teamclone.engine.inputs.layout import GEOMETRY, OTHER, OTHERS, PARTS, TACKLE
 from teamclone.engine.network.constants import (
     ACTIVATIONS,
     CATCH_DIRECTIONS,
@@ -31,6 +31,7 @@ from teamclone.engine.network.constants import (
 from teamclone.planner.columns import WAYS
 from teamclone.planner.tackle import DIRECTIONS as TACKLE_DIRECTIONS
 from teamclone.rcss.commands import REPERTOIRE, parameters_of
+from teamclone.system.compiling import kernel
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float32]
@@ -49,6 +50,8 @@ decide on the command, on a kick, on target points. ARGUMENTS_AT: for each param
 whether it is an angle. STACK: place of the row of the first of DEPTH hidden layers. WIDEST: the most inputs or outputs
 of any layer. N_DASH, N_TURN, N_KICK, N_CATCH, N_MOVE: components, or directions, of all members together."""
 
+EGOCENTRIC, PAPER = 0, 1
+"""The first of ``Weights.inputs``: which inputs the network has."""
 WEIGHTS, INS, OUTS, ACTIVATION, ROW_FIELDS = range(5)
 """Numbers of a row."""
 NO_ACTIVATION = -1
@@ -58,7 +61,8 @@ ROW_NAMES = range(N_SHAPE, N_SHAPE + 27)
 (PLACES, COMMAND, PARAMETER, DASH, TURN, INCOME, POWER, CATCH_CLASS, CATCH_EDGES, CATCH_SHARPNESS, MOVE_PLACE,
  OTHER_IN, OTHER_OUT, SITUATION, BEFORE, BETWEEN, AFTER, ASK, HEARD, THINK_IN, THINK_OUT, KICK, KICK_TARGET, WAY_SHARE,
  WAY_ERROR, TACKLE_CLASS, TACKLE_TRUST) = ROW_NAMES  # fmt: skip
-N_FIELDS = N_SHAPE + len(ROW_NAMES)
+N_NAMED = len(ROW_NAMES)
+N_FIELDS = N_SHAPE + N_NAMED
 """Fields with the places of rows that all networks have; the hidden layers come after these in the table. BEFORE,
 BETWEEN and AFTER are layer norms: scales, then shifts."""
 
@@ -230,17 +234,45 @@ def commands_of(spec: Ints) -> tuple[str, ...]:
     return tuple(REPERTOIRE[place] if place < 4 else further.get(place, "none") for place in range(int(spec[COMMANDS])))
 
 
-def faults(spec: Ints, n_values: int) -> str | None:
-    """Return what is wrong with the integers and the number of weights of a file; None for nothing."""
+N_PARTS = len(PARTS)
+FAULTS = (
+    "",
+    "{fields} integers describe the network, {expected} at least are expected",
+    "its table of layers is not where it should be",
+    "it holds {values:,} weights, its description has {described:,}",
+    "a layer lies outside of its weights",
+    "its inputs are none that this version makes",
+)
+"""What `fault` means."""
+
+
+@kernel
+def fault(spec: Ints, inputs: Ints, n_values: int) -> int:
+    """Return what is wrong with the description of a network, an index into FAULTS; 0 for nothing.
+
+    Args:
+        inputs: see `weights.Weights`. n_values: the number of weights that there are.
+    """
     if len(spec) < N_FIELDS:
-        return f"{len(spec)} integers describe the network, {N_FIELDS} at least are expected"
-    at, rows = int(spec[ROWS_AT]), int(spec[N_ROWS])
-    if at < N_FIELDS or rows < len(ROW_NAMES) or at + rows * ROW_FIELDS != len(spec):
-        return "its table of layers is not where it should be"
+        return 1
+    at, rows = spec[ROWS_AT], spec[N_ROWS]
+    if at < N_FIELDS or rows < N_NAMED or at + rows * ROW_FIELDS != len(spec):
+        return 2
     if n_values != spec[N_VALUES]:
-        return f"it holds {n_values:,} weights, its description has {int(spec[N_VALUES]):,}"
-    table = spec[at:].reshape(rows, ROW_FIELDS)
-    ends = table[:, WEIGHTS] + (table[:, INS] + 1) * table[:, OUTS]
-    if table[:, :ACTIVATION].min() < 0 or (ends + (spec[MEMBERS] - 1) * spec[MEMBER_VALUES]).max() > n_values:
-        return "a layer lies outside of its weights"
-    return None
+        return 3
+    for row in range(rows):
+        first = at + row * ROW_FIELDS
+        begin, ins, outs = spec[first + WEIGHTS], spec[first + INS], spec[first + OUTS]
+        if min(begin, ins, outs) < 0 or max(begin, ins, outs) > n_values:
+            return 4
+        if begin + (ins + 1) * outs + (spec[MEMBERS] - 1) * spec[MEMBER_VALUES] > n_values:
+            return 4
+    return 0 if len(inputs) > 0 and (inputs[0] != EGOCENTRIC or len(inputs) == 1 + N_PARTS) else 5
+
+
+def faults(spec: Ints, inputs: Ints, n_values: int) -> str | None:
+    """Return what is wrong with the description of a network in words; None for nothing."""
+    found: int = fault.py_func(spec, inputs, n_values)
+    described = spec[N_VALUES] if len(spec) > N_VALUES else 0
+    text = FAULTS[found].format(fields=len(spec), expected=N_FIELDS, values=n_values, described=described)
+    return text or None

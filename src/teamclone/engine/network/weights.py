@@ -6,10 +6,11 @@ Little-endian, without gaps:
     uint32    FORMAT
     uint32    CRC-32 of all bytes that follow
     16 bytes  id of the model, ASCII
-    int64     number of integers
-    int64     number of weights
-    int64 []  the integers, see `spec`
-    float32 [] the weights
+    4 int64   lengths of the four parts that follow, see `Weights`
+    int64 []  spec
+    int64 []  inputs
+    float32 [] values
+    uint8 []  order
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from teamclone.engine.network.spec import N_VALUES, Floats, Ints, commands_of, faults
+from teamclone.engine.network.spec import Floats, Ints, commands_of, faults
 from teamclone.errors import RunError
 from teamclone.system.files import write_atomic
 
 MAGIC = b"TCLONENN"
 FORMAT = 1
-_START, _COUNTS = struct.Struct("<8sII"), struct.Struct("<16sqq")
+_PARTS = {"spec": "<i8", "inputs": "<i8", "values": "<f4", "order": "u1"}
+_START, _COUNTS = struct.Struct("<8sII"), struct.Struct("<16s4q")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,11 +39,15 @@ class Weights:
 
     Attributes:
         spec: see `spec`. values: (spec[N_VALUES],). model_id: hash of the weights that they are made from.
+        inputs: how a state becomes inputs: EGOCENTRIC and `inputs.layout.places`, or PAPER and `inputs.paper.fields`.
+        order: `kick_sequences.kick_order` by the server's defaults, flat; empty where nothing is planned.
     """
 
     spec: Ints
     values: Floats
     model_id: str
+    inputs: Ints
+    order: NDArray[np.uint8]
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -52,9 +59,8 @@ def write_weights(path: Path, weights: Weights) -> None:
     """Write a network; the file appears whole or not at all."""
     body = b"".join(
         (
-            _COUNTS.pack(weights.model_id.encode("ascii"), len(weights.spec), int(weights.spec[N_VALUES])),
-            weights.spec.astype("<i8").tobytes(),
-            weights.values.astype("<f4").tobytes(),
+            _COUNTS.pack(weights.model_id.encode("ascii"), *(len(getattr(weights, name)) for name in _PARTS)),
+            *(getattr(weights, name).astype(kind).tobytes() for name, kind in _PARTS.items()),
         )
     )
     write_atomic(path, _START.pack(MAGIC, FORMAT, zlib.crc32(body)) + body)
@@ -76,17 +82,21 @@ def read_weights(path: Path) -> Weights:
     if number != FORMAT:
         raise RunError(f"{path}: weights of format {number}, expected {FORMAT}: write them anew from the run")
     body = memoryview(data)[_START.size :]
-    name, n_spec, n_values = _COUNTS.unpack_from(body)
-    expected = _COUNTS.size + 8 * n_spec + 4 * n_values
+    model, *lengths = _COUNTS.unpack_from(body)
+    ends = np.cumsum([length * np.dtype(kind).itemsize for length, kind in zip(lengths, _PARTS.values(), strict=True)])
+    expected = _COUNTS.size + int(ends[-1])
     if zlib.crc32(body) != crc:
         raise RunError(
             f"{path}: damaged: its checksum is not that of its {len(data):,} bytes"
             f" ({_START.size + expected:,} expected): write it anew from the run"
         )
-    if n_spec < 0 or n_values < 0 or expected != len(body):
+    if min(lengths) < 0 or expected != len(body):
         raise RunError(f"{path}: {len(data):,} bytes, {_START.size + expected:,} expected: write it anew from the run")
-    spec = np.frombuffer(body, "<i8", n_spec, _COUNTS.size).astype(np.int64)
-    values = np.frombuffer(body, "<f4", n_values, _COUNTS.size + 8 * n_spec).astype(np.float32)
-    if fault := faults(spec, n_values):
+    starts = _COUNTS.size + ends - np.diff(ends, prepend=0)
+    parts = {
+        name: np.frombuffer(body, kind, length, start).astype(np.dtype(kind).newbyteorder("="))
+        for (name, kind), length, start in zip(_PARTS.items(), lengths, starts.tolist(), strict=True)
+    }
+    if fault := faults(parts["spec"], parts["inputs"], len(parts["values"])):
         raise RunError(f"{path}: {fault}: write it anew from the run")
-    return Weights(spec=spec, values=values, model_id=name.rstrip(b"\0").decode("ascii", "replace"))
+    return Weights(model_id=model.rstrip(b"\0").decode("ascii", "replace"), **parts)

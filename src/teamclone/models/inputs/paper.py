@@ -8,13 +8,12 @@ from typing import Protocol
 import torch
 from torch import Tensor, nn
 
+from teamclone.engine.inputs.paper import BODY_LIMIT_DEG
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import GROUPS, RANGES
 from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.world.channels import CHANNEL, TYPE_FIELD
 from teamclone.world.state import State
-
-BODY_LIMIT_DEG = 180.0
 
 PLAYERS = (*(f"team_{number}" for number in range(1, 12)), *(f"opponent_{number}" for number in range(1, 12)))
 """The player axis of a state, by name."""

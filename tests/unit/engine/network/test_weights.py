@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from tests.unit.engine.network.test_answer import MODELS, varied
 
 from teamclone.engine.network import spec as of
 from teamclone.engine.network.network import Network
-from teamclone.engine.network.weights import FORMAT, Weights, read_weights, write_weights
+from teamclone.engine.network.weights import FORMAT, read_weights, write_weights
 from teamclone.errors import RunError
 from teamclone.models.clone import model_id
 from teamclone.models.packing import pack
@@ -41,13 +42,16 @@ def test_a_network_is_read_as_it_was_written(name: str, tmp_path: Path) -> None:
 
 def test_the_bytes_are_as_documented(written: Path) -> None:
     data = written.read_bytes()
-    magic, number, crc, name, n_spec, n_values = struct.unpack_from("<8sII16sqq", data)
+    magic, number, crc, name, *lengths = struct.unpack_from("<8sII16s4q", data)
     assert (magic, number, crc) == (b"TCLONENN", FORMAT, zlib.crc32(data[16:]))
     weights = read_weights(written)
     assert name.decode() == weights.model_id
-    assert struct.unpack_from(f"<{n_spec}q", data, 48) == tuple(weights.spec)
-    assert struct.unpack_from(f"<{n_values}f", data, 48 + 8 * n_spec) == tuple(weights.values)
-    assert len(data) == 48 + 8 * n_spec + 4 * n_values
+    at = 64
+    for part, code, size in (("spec", "q", 8), ("inputs", "q", 8), ("values", "f", 4), ("order", "B", 1)):
+        length = lengths.pop(0)
+        assert struct.unpack_from(f"<{length}{code}", data, at) == tuple(getattr(weights, part)), part
+        at += length * size
+    assert len(data) == at
 
 
 def test_every_cut_and_every_changed_byte_is_noticed(written: Path, tmp_path: Path) -> None:
@@ -102,7 +106,9 @@ def test_a_description_that_does_not_fit_is_refused(change, message: str, writte
     weights = read_weights(written)
     path = tmp_path / "weights.bin"
     spec = change(weights.spec)
-    body = struct.pack("<16sqq", b"x", len(spec), len(weights.values)) + spec.tobytes() + weights.values.tobytes()
+    inputs, values = weights.inputs, weights.values
+    counts = struct.pack("<16s4q", b"x", len(spec), len(inputs), len(values), 0)
+    body = counts + spec.tobytes() + inputs.tobytes() + values.tobytes()
     path.write_bytes(struct.pack("<8sII", b"TCLONENN", FORMAT, zlib.crc32(body)) + body)
     with pytest.raises(RunError, match=message):
         read_weights(path)
@@ -119,5 +125,5 @@ def test_writing_keeps_the_old_file_until_the_new_one_is_whole(written: Path, tm
     path.write_bytes(b"old")
     weights = read_weights(written)
     with pytest.raises(UnicodeEncodeError):
-        write_weights(path, Weights(spec=weights.spec, values=weights.values, model_id="\u00e9"))
+        write_weights(path, replace(weights, model_id="\u00e9"))
     assert path.read_bytes() == b"old"

@@ -18,7 +18,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "src" / PACKAGE
 
 BASE = ("errors", "system", "rcss")
 READING = (*BASE, "logs", "world", "store")
-CLONING = ("dataset", "play", "models", "training", "search", "evaluation")
+CLONING = ("dataset", "play", "models", "training", "export", "search", "evaluation")
 MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "errors": (),
     "system": ("errors",),
@@ -33,9 +33,9 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "play": (*BASE, "logs", "protocol", "store"),
     "planner": ("system", "rcss", "dynamics", "world.channels"),
     "engine": ("errors", "system", "rcss", "planner", "world.channels"),
-    "export": ("errors", "system", "planner", "engine"),
     "models": (*BASE, "dynamics", "world", "planner", "engine"),
-    "training": (*BASE, "world", "dataset", "models"),
+    "training": (*BASE, "world", "dataset", "engine", "models"),
+    "export": (*BASE, "planner", "engine", "world", "dataset", "models", "training"),
     "search": (*BASE, "plots", "dataset", "engine.network.constants", "models", "training"),
     "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "store", "dataset", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
@@ -57,6 +57,7 @@ MAY_IMPORT_TORCH = (
     "models",
     "training",
     "search",
+    "export.contract",
     "evaluation",
     "rollouts",
     "report",

@@ -14,6 +14,7 @@ from teamclone.cli import (
     bench,
     dataset,
     evaluate,
+    export,
     info,
     ingest,
     matches,
@@ -72,6 +73,7 @@ for command in (
     evaluate.evaluate,
     report.report,
     bench.bench,
+    export.export,
 ):
     app.command()(command)
 app.command("run", hidden=True)(pipeline.run)

@@ -62,7 +62,7 @@ def _facts() -> list[str]:
         f"inline constexpr const char* CLONED[] = {{{names}}};",
         "",
         *_enum("Flag", "Bits of Player::flags.", _FLAGS),
-        *_enum("Kind", "Commands of the server, as in Player::last_command; 0 for none.", _members("KIND", CommandKind)),
+        *_enum("Kind", "Values of Player::last_command; 0 for none.", _members("KIND", CommandKind)),
         *_enum("Mode", "Play modes of State::mode.", _members("MODE", PlayMode)),
         *_struct("Player", _ABSENT, dict.fromkeys(about, 0.0), about),
         *_struct("PlayerType", "Parameters of a player's type.", player_types.DEFAULTS),

@@ -5,15 +5,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.engine.inputs.project import Frames
+from teamclone import rcss
+from teamclone.engine import inputs
+from teamclone.engine.inputs.project import Frames, as_arrays
 from teamclone.rcss import pitch
 from teamclone.rcss.player_types import RANGES
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.server_params import SERVER_FIELD
-from teamclone.system.compiling import kernel
+from teamclone.system import compiling
+from teamclone.system.compiling import cached_kernel, kernel, version_of
+from teamclone.world import channels
 from teamclone.world.channels import CHANNEL, TYPE_FIELD
 
 BODY_LIMIT_DEG = 180.0
@@ -68,3 +75,38 @@ def fill_paper(frames: Frames, index: int, actor: int, of_types: NDArray[np.int6
         for player in range(N_PLAYERS):
             out[at] = _projected(types[player], of_types[place])
             at += 1
+
+
+def _compiled() -> Any:
+    """Return a kernel that fills the inputs of many samples."""
+    version = version_of(inputs, rcss, channels, compiling)
+
+    @cached_kernel(nogil=True, error_model="numpy")
+    def project_all(
+        frames: Frames,
+        frame: NDArray[np.int64],
+        actor: NDArray[np.int64],
+        of_types: NDArray[np.int64],
+        out: NDArray[np.float32],
+    ) -> int:
+        for row in range(len(frame)):
+            fill_paper(frames, frame[row], actor[row], of_types, out[row])
+        return version
+
+    return project_all
+
+
+_project_all = _compiled()
+
+
+def project_paper(
+    frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64], of_types: Sequence[int], columns: int
+) -> NDArray[np.float32]:
+    """Return (n, columns) inputs of samples, before normalisation.
+
+    Args:
+        frames: the frames. frame: (n,) of each sample. actor: (n,) 0..10. of_types: see `fields`.
+    """
+    out = np.empty((len(frame), columns), np.float32)
+    _project_all(as_arrays(frames), frame, actor, np.array(of_types, np.int64), out)
+    return out

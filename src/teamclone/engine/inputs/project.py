@@ -160,6 +160,11 @@ _project_all = _compiled()
 tell_when_compiled({_project_all: "compiling the inputs of the network, once (about a minute)"})
 
 
+def as_arrays(frames: Frames) -> Frames:
+    """Return frames as the kernels take them: of the types of `Frames`, without gaps in memory."""
+    return Frames(*(np.ascontiguousarray(part, kind) for part, kind in zip(frames, _KINDS, strict=True)))
+
+
 def project(
     frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64], places: Sequence[int], columns: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -197,6 +202,6 @@ def plans(frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64]) ->
 
 def _arguments(frames: Frames, frame: NDArray[np.int64], actor: NDArray[np.int64]) -> tuple[Any, ...]:
     """Return the first arguments of the kernel: samples in the order of their frames, so that each is filled once."""
-    frames = Frames(*(np.ascontiguousarray(part, kind) for part, kind in zip(frames, _KINDS, strict=True)))
+    frames = as_arrays(frames)
     order = np.argsort(frame, kind="stable")
     return frames, np.stack([order, frame[order], actor[order]], axis=1), *orders_of(frames.server)

@@ -1,15 +1,35 @@
-// Answers to the states in a folder, by the weights there; leaves statuses, probabilities and numbers of all commands.
+// Answers to the states in a folder, so many times each; leaves statuses, answers and microseconds there.
+// `teamclone export --check` compiles and runs it, and compares the answers with those of the network in Python.
 #include "teamclone.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
-
-#include "files.hpp"
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
 
 using namespace teamclone::v1;
 
 namespace {
+
+std::string folder;
+
+template <typename T> std::vector<T> read_file(const std::string& name) {
+    std::FILE* file = std::fopen((folder + "/" + name).c_str(), "rb");
+    if (file == nullptr) std::abort();
+    std::vector<T> found;
+    T one;
+    while (std::fread(&one, sizeof(T), 1, file) == 1) found.push_back(one);
+    std::fclose(file);
+    return found;
+}
+
+template <typename T> void write_file(const std::string& name, const std::vector<T>& cells) {
+    std::FILE* file = std::fopen((folder + "/" + name).c_str(), "wb");
+    if (file == nullptr || std::fwrite(cells.data(), sizeof(T), cells.size(), file) != cells.size()) std::abort();
+    std::fclose(file);
+}
 
 template <typename T> void fill(T* to, const std::vector<float>& from, std::size_t index, std::size_t count) {
     std::memcpy(static_cast<void*>(to), from.data() + index * count, count * sizeof(float));

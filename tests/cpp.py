@@ -16,14 +16,25 @@ CHECKED = ("-O1", "-g", "-DTEAMCLONE_CHECKED", "-fsanitize=address,undefined", "
 """Ends the program at once where it reads or writes outside of an array, or does what C++ leaves undefined."""
 
 
-def compiled(folder: Path, header: str, name: str, *, compiler: str = "g++", flags: tuple[str, ...] = QUICK) -> Path:
-    """Return the program that a file of tests/data/cpp makes with a header; skips where there is no such compiler."""
+def compiled(
+    folder: Path,
+    header: str,
+    name: str,
+    *,
+    source: Path | None = None,
+    compiler: str = "g++",
+    flags: tuple[str, ...] = QUICK,
+) -> Path:
+    """Return the program that a file, by default one of tests/data/cpp, makes with a header.
+
+    Skips where there is no such compiler.
+    """
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler}: the header is not compiled")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "teamclone.hpp").write_text(header, encoding="utf-8")
     program = folder / name
-    command = [compiler, *FLAGS, *flags, "-I", str(folder), "-I", str(SOURCES), str(SOURCES / f"{name}.cpp")]
+    command = [compiler, *FLAGS, *flags, "-I", str(folder), "-I", str(SOURCES), str(source or SOURCES / f"{name}.cpp")]
     done = subprocess.run([*command, "-o", str(program)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[:4000]
     return program

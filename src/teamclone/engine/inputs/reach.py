@@ -116,7 +116,8 @@ def cycles_to_ball(scene: Array, path: Array, row: int, reserve: float, slides: 
         if run[max(cycle - turns_needed(facing, metres, area, within), 0)] >= left:
             return float(cycle)
     late = REACH_CYCLES + max(left - run[REACH_CYCLES], 0.0) / top
-    return late if late < NEVER_CYCLES else NEVER_CYCLES
+    # A type that no server makes may give any number, or none.
+    return max(late, float(REACH_CYCLES)) if late < NEVER_CYCLES else NEVER_CYCLES
 
 
 @kernel

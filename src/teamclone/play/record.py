@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from teamclone.errors import PlayError
 from teamclone.play.schedule import TeamSpec
-from teamclone.system.documents import check_format, read_json, write_document
+from teamclone.system.documents import check_format, misfit, read_json, write_document
 
 FORMAT = 2
 NAME = "match.json"
@@ -179,6 +179,25 @@ def save_record(folder: Path, record: Record) -> None:
     write_document(folder / NAME, record.to_json())
 
 
+_MAYBE = (str, type(None))
+_COUNTS = ([int], type(None))
+_SIDE = {"team": str, "name": _MAYBE, "score": int, "holes": _COUNTS, "clashes": _COUNTS, "missed": _COUNTS}
+_SIDE |= {"files": {"*": str}, "exits": {"*": (int, type(None))}}
+_SHAPE = {
+    "left": _SIDE,
+    "right": _SIDE,
+    "trouble": (type(None), {"fault": str, "text": str, "side": _MAYBE, "unums": [int], "cycle": (int, type(None))}),
+    "logs": [str],
+    "ports": [int],
+    "server": dict,
+    "commands": {"*": [str]},
+    **dict.fromkeys(("id", "fingerprint", "machine", "started", "teamclone"), str),
+    **dict.fromkeys(("attempt", "cycles", "cpus"), int),
+    **dict.fromkeys(("seconds", "play_seconds"), float),
+}
+"""Of match.json."""
+
+
 def load_record(folder: Path) -> Record | None:
     """Read the record in a folder; None where there is none.
 
@@ -195,6 +214,8 @@ def load_record(folder: Path) -> Record | None:
             again="choose another --out",
             error=PlayError,
         )
+        if problem := misfit(values, _SHAPE):
+            raise ValueError(problem)
         return Record.from_json(values)
     except (FileNotFoundError, NotADirectoryError):
         return None

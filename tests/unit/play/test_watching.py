@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mutations import check_readers
 from teamclone.errors import PlayError
 from teamclone.logs import read_match
 from teamclone.logs.match import Match
@@ -148,6 +149,11 @@ def test_a_damaged_or_foreign_record_is_told_with_its_path(tmp_path: Path) -> No
         PlayError, match=f"match record of format 99, this version reads {FORMAT}; choose another --out"
     ):
         load_record(tmp_path)
+
+
+def test_a_record_of_any_shape_is_read_or_refused(tmp_path: Path) -> None:
+    save_record(tmp_path, record(Trouble(fault=Fault.CRASHED, text="gone")))
+    check_readers(tmp_path / "match.json", lambda: load_record(tmp_path))
 
 
 def test_the_server_s_output_tells_version_seed_and_waits() -> None:

@@ -21,7 +21,8 @@ from teamclone.logs import read_match
 _PLAYERS = b"".join(b"((%c%d)0 0 0 0 0 0 0 0)" % (side, unum) for side in b"lr" for unum in range(1, 12))
 SHORTEST_SHOW = b"(show 1((b)0 0 0 0)" + _PLAYERS + b")\n"
 """The shortest record of a text log that is whole."""
-JSON_SHOW = b'{"show":{"time":1,"ball":{"x":0,"y":0,"vx":0,"vy":0},"players":[]}}'
+JSON_SHOW = b'{"show":{"time":1,"ball":{"x":0,"y":0,"vx":0,"vy":0},"players":[{"side":"l","unum":1}]}}'
+"""The shortest record of a JSON log that is whole."""
 _SHOW_2 = b"\0\1" + bytes(316)
 _SHOW_3 = b"\0\1" + bytes(1428)
 

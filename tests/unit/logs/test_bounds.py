@@ -26,7 +26,7 @@ REPEATED = {
     "frames in no record": (b"[\n", b'"show"'),
     "records that are none": (b"[\n", b'{"show":1}\n'),
     "lines that are no JSON": (b'[\n{"show":1}\n', b"x\n"),
-    "frames without players": (b"[\n", JSON_SHOW + b",\n"),
+    "frames of one player": (b"[\n", JSON_SHOW + b",\n"),
     "messages without an end": (b"1,0\tRecv A_1: ", b"(say x"),
     "parentheses without an end": (b"1,0\tRecv A_1: ", b"(say ("),
     "records that say nothing": (b"ULG\3\0\1" + bytes(1428), b"\0\4"),

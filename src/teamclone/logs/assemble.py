@@ -97,15 +97,22 @@ def frame_columns(
     return made
 
 
-def limited_score(value: float) -> int:
-    """Return a score or count of penalties limited to its column's range, for damaged logs.
+def team_mark(
+    frame: int, names: tuple[str | None, str | None], scores: Sequence[float], before: Sequence[TeamMark]
+) -> tuple[TeamMark, bool]:
+    """Return a statement about the teams, and whether its scores and penalties are numbers that their columns hold.
 
-    Raises:
-        ValueError: it is not a number.
+    Where they are not, a damaged log's, those of the statement ``before`` it stay.
+
+    Args:
+        frame, names, scores: of the `TeamMark`.
+        before: the statements of the log so far.
     """
-    if math.isnan(value):
-        raise ValueError("a score is no number")
-    return int(min(max(value, 0), MAX_SCORE))
+    known = all(0 <= score <= MAX_SCORE for score in scores)
+    kept = tuple(int(score) for score in scores) if known else before[-1].scores if before else (0,) * len(SCORES)
+    first, second, third, fourth, fifth, sixth = kept
+    left, right = names
+    return TeamMark(frame=frame, left=left, right=right, scores=(first, second, third, fourth, fifth, sixth)), known
 
 
 def limited_cycle(digits: bytes) -> int:

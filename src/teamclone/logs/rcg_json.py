@@ -22,8 +22,8 @@ from teamclone.logs.assemble import (
     checked_type,
     final_teams,
     frame_columns,
-    limited_score,
     player_type_columns,
+    team_mark,
 )
 from teamclone.logs.match import Columns, GameLog, Problem, Severity, empty_columns
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
@@ -252,7 +252,11 @@ class _Reader:
                     word = str(body["mode"])[:40]
                     self.warn("unknown-playmode", f"play mode {word!r} is unknown, kept as 0", line=line)
             case "team":
-                self.teams.append(_team_mark(len(self.frames), body))
+                names, scores = _teams(body)
+                mark, known = team_mark(len(self.frames), names, scores, self.teams)
+                self.teams.append(mark)
+                if not known:
+                    raise ValueError("a score that no match has")
             case "server_param":
                 self.server_params = _params(body)
             case "player_param":
@@ -330,22 +334,12 @@ def _name(value: Any) -> str | None:
     return value
 
 
-def _team_mark(frame: int, body: Record) -> TeamMark:
+def _teams(body: Record) -> tuple[tuple[str | None, str | None], list[float]]:
+    """Return the names, left and right, and scores and penalties in the order of ``TeamMark.scores``."""
     teams = {team["side"]: team for team in body["teams"]} if "teams" in body else body
     left, right = teams["l"], teams["r"]
-    return TeamMark(
-        frame=frame,
-        left=_name(left["name"]),
-        right=_name(right["name"]),
-        scores=(
-            limited_score(left["score"]),
-            limited_score(right["score"]),
-            limited_score(left.get("pen_score", 0)),
-            limited_score(left.get("pen_miss", 0)),
-            limited_score(right.get("pen_score", 0)),
-            limited_score(right.get("pen_miss", 0)),
-        ),
-    )
+    penalties = [float(team.get(key, 0)) for team in (left, right) for key in ("pen_score", "pen_miss")]
+    return (_name(left["name"]), _name(right["name"])), [float(left["score"]), float(right["score"]), *penalties]
 
 
 def _params(body: Record) -> dict[str, float | str]:

@@ -18,8 +18,8 @@ from teamclone.logs.assemble import (
     final_teams,
     frame_columns,
     limited_cycle,
-    limited_score,
     player_type_columns,
+    team_mark,
 )
 from teamclone.logs.match import Columns, GameLog, Problem, Severity
 from teamclone.logs.shows import read_shows
@@ -131,7 +131,11 @@ class _Statements:
                 self.unknown = self.unknown or (line, match)
             self.modes.append((frame, int(mode or 0)))
         elif match := _TEAM.match(text):
-            self.teams.append(_team_mark(frame, match))
+            left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
+            scores = [float(value or 0) for value in match.groups()[3:]]
+            mark, known = team_mark(frame, (left, right), scores, self.teams)
+            self.teams.append(mark)
+            return known
         elif text.startswith(b"(msg "):
             self.finished = self.finished or _RESULT in text
         elif text.startswith(b"(server_param "):
@@ -164,18 +168,6 @@ class _Statements:
                 cycle=limited_cycle(match[1]),
             )
         ]
-
-
-def _team_mark(frame: int, match: re.Match[bytes]) -> TeamMark:
-    """Return names and scores of a ``(team ...)`` line, which hold from ``frame`` on."""
-    left, right = (None if name == b"null" else name.decode("utf-8", "replace") for name in match.group(2, 3))
-    scores = [limited_score(float(value or 0)) for value in match.groups()[3:]]
-    return TeamMark(
-        frame=frame,
-        left=left,
-        right=right,
-        scores=(scores[0], scores[1], scores[2], scores[3], scores[4], scores[5]),
-    )
 
 
 def parameters(line: bytes) -> dict[str, float | str]:

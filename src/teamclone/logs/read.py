@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Iterable
@@ -71,7 +72,8 @@ def find_matches(paths: Iterable[Path]) -> list[LogPair]:
     """Return the matches in files and folders (searched recursively), each once, ordered by path.
 
     Files are paired by name: ``x.rcg.gz`` goes with ``x.rcl`` in any packing. In folders the ``._`` files that macOS
-    keeps beside others are passed over. A file named on its own is taken whatever it is called.
+    keeps beside others are passed over, and archives with a warning. A file named on its own is taken whatever it is
+    called.
 
     Raises:
         UsageError: a path does not exist, or there is no log under any of them.
@@ -96,8 +98,11 @@ def find_matches(paths: Iterable[Path]) -> list[LogPair]:
             partner = partner_of(file)
             if partner is not None:
                 pair.setdefault("rcl" if kind == "rcg" else "rcg", partner)
+    archives = sorted(file for path in given for file in path.rglob("*") if _ARCHIVE.search(file.name))
+    if archives and found:
+        names = f"{archives[0]}{f' and {len(archives) - 1} more' if len(archives) > 1 else ''}"
+        logging.getLogger(__name__).warning("%s: an archive, passed over; unpack it to read the logs in it", names)
     if not found:
-        archives = sorted(file for path in given for file in path.rglob("*") if _ARCHIVE.search(file.name))
         unpack = f"; unpack {archives[0].name} first (tar xf)" if archives else ""
         raise UsageError(f"no .rcg or .rcl file under {', '.join(map(str, given)) or 'no path'}{unpack}")
     return [LogPair(rcg=pair.get("rcg"), rcl=pair.get("rcl")) for _, pair in sorted(found.items())]

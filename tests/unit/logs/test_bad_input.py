@@ -264,7 +264,7 @@ def test_a_server_that_was_closed_before_the_match_began(tmp_path: Path):
         read_match(path)
 
 
-def test_archives_are_to_be_unpacked(rcg_of: Callable[[str], Path], tmp_path: Path):
+def test_archives_are_to_be_unpacked(rcg_of: Callable[[str], Path], tmp_path: Path, caplog: pytest.LogCaptureFixture):
     import tarfile
 
     with tarfile.open(tmp_path / "games.rcg.tar.gz", "w:gz") as archive:
@@ -277,6 +277,12 @@ def test_archives_are_to_be_unpacked(rcg_of: Callable[[str], Path], tmp_path: Pa
     (tmp_path / "one.rcg").unlink()
     with pytest.raises(UsageError, match=r"no .rcg or .rcl file under .*; unpack games.rcg.tar.gz first"):
         find_matches([tmp_path])
+    assert not caplog.messages
+    (tmp_path / "other.rcg").touch()
+    (tmp_path / "other.zip").touch()
+    assert [pair.path.name for pair in find_matches([tmp_path])] == ["other.rcg"]
+    (line,) = caplog.messages
+    assert line.startswith(f"{tmp_path / 'games.rcg.tar.gz'} and 1 more: an archive, passed over")
 
 
 def test_a_lone_game_log(rcg_of: Callable[[str], Path], tmp_path: Path):
@@ -304,6 +310,25 @@ def test_numbers_beyond_any_column_are_limited(rcg_of: Callable[[str], Path], tm
     assert len(match.frames["cycle"]) == 199
     assert {problem.cycle for problem in match.problems} <= {None, 2**31 - 1}
     assert tables_of(match)["problems"].num_rows == len(match.problems)
+
+
+@pytest.mark.parametrize("score", [b"32768", b"99999", b"-1", b"9" * 5000])
+@pytest.mark.parametrize("name", ["v6", "json"])
+def test_a_score_that_no_match_has_is_no_score(rcg_of: Callable[[str], Path], tmp_path: Path, name: str, score: bytes):
+    """The score before it stays, so do the names."""
+    data = gzip.decompress(rcg_of(name).read_bytes())
+    patterns = {"v6": rb"(\(team 1 HELIOS_base \w+) 0 0\)", "json": rb'("l":{"name":"HELIOS_base","score":)0}'}
+    ends = {"v6": rb"\1 %b 0)" % score, "json": rb"\g<1>%b}" % score}
+    data, changed = re.subn(patterns[name], ends[name], data, count=1)
+    assert changed
+    path = tmp_path / "score.rcg"
+    path.write_bytes(data)
+    match = read_match(path)
+    assert (match.left.name, match.left.score) == ("HELIOS_base", 0)
+    assert not match.frames["left_score"].any()
+    assert [problem.code for problem in match.problems if problem.line] == [
+        "bad-record" if name == "json" else "odd-line"
+    ]
 
 
 def test_a_json_log_whose_team_is_called_by_a_number(rcg_of: Callable[[str], Path], tmp_path: Path):

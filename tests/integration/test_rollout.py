@@ -99,7 +99,10 @@ def test_the_report_shows_them(run: Path, log: Path, tmp_path: Path) -> None:
     assert {name: (folder / name).read_text() for name in whole} == whole
     opened = tc.load(tmp_path / "run").run
     assert fresh_rollouts(opened, checkpoint="best-loss") is not None
+    without_path = json.loads(whole["fans.json"])
+    without_path["fans"][0]["bodies"][0]["truth"] = ""
     for name, change in (
+        ("fans.json", without_path),
         *(
             ("rollouts.json", change)
             for change in ({"model_id": "0" * 16}, {"ahead": 5}, {"ahead": {}}, {"matches": 3})

@@ -30,6 +30,8 @@ from teamclone.training.config import Config, to_toml
 from teamclone.training.run import Run
 
 NOTHING = "\N{EN DASH}"
+_DAMAGED = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+"""What a document of wrong shape ends in where it is read."""
 SPLIT_NAMES = {
     "train": "training matches of another dataset",
     "validation": "validation matches",
@@ -272,7 +274,7 @@ def make_report(
     history = run.history()
     try:
         html = render(run, evaluation, bench, history=history, ahead=ahead, replays=replays_of(run, path.parent))
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, jinja2.TemplateError) as error:
+    except (*_DAMAGED, jinja2.TemplateError) as error:
         raise RunError(
             f"{run.path}: evaluation.json or bench.json is not what teamclone wrote ({error!r}); make them again with "
             "`teamclone evaluate` and `teamclone bench`"
@@ -353,7 +355,7 @@ def fresh_rollouts(run: Run, *, checkpoint: str) -> Ahead | None:
         document, fans = load_rollouts(run.path / "rollouts")
         fresh = document["model_id"] == model_id(run.load_model(checkpoint))
         return Ahead.of(document, fans) if fresh else None
-    except (RunError, KeyError, TypeError, ValueError, AttributeError):  # what is damaged is not shown
+    except (RunError, *_DAMAGED):  # what is damaged is not shown
         return None
 
 

@@ -379,6 +379,26 @@ def test_a_player_is_chosen_by_a_click_and_followed(page: Page, predicted: Path)
 
 @pytest.mark.browser
 @in_a_browser
+def test_the_list_keeps_its_place_for_the_keyboard(page: Page, predicted: Path) -> None:
+    opened(page, predicted, "#c=1")
+    page.evaluate(
+        "[...document.querySelectorAll('#list li')].find((row) => /goal/.test(row.textContent)).firstElementChild.focus()"
+    )
+    for press in ("keyDown", "keyUp"):
+        page.call("Input.dispatchKeyEvent", type=press, key="Enter", code="Enter", windowsVirtualKeyCode=13, text="\r")
+    page.wait_for("replay.clock.now > 0 && replay.view.chosen !== null && !replay.dirty")
+    assert "goal" in page.evaluate("document.activeElement.textContent")
+    page.evaluate("replay.choose(null)")
+    page.wait_for("!replay.dirty")
+    page.evaluate("document.querySelector('#facts button').focus()")
+    page.evaluate("document.activeElement.click()")
+    page.wait_for("document.activeElement.id === 'player'")
+    assert page.evaluate("document.getElementById('player').value") == "0"
+    assert page.problems == []
+
+
+@pytest.mark.browser
+@in_a_browser
 def test_fingers_choose_and_zoom(page: Page, predicted: Path) -> None:
     opened(page, predicted, "#c=150", width=390, height=844)
     left, top, *_ = box_of(page, "pitch")

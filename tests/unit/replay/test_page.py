@@ -18,6 +18,7 @@ from teamclone.errors import UsageError
 from teamclone.logs import Match, find_matches, read_match, read_pair
 from teamclone.logs.align import first_body_commands, follows, slot_of
 from teamclone.logs.match import Columns
+from teamclone.plots.style import theme_css
 from teamclone.rcss.commands import CommandKind
 from teamclone.replay import channels
 from teamclone.replay.page import MOST_BYTES, SCRIPTS, joined, make_replay
@@ -214,6 +215,34 @@ def test_modules_can_be_one_script() -> None:
     script = joined({name: assets.joinpath(name).read_text("utf-8") for name in SCRIPTS})
     assert not re.findall(r"^(import|export) ", script, re.MULTILINE)
     assert "</script" not in script
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of #rrggbb, as WCAG 2 defines it."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("night", [False, True])
+def test_colours_stand_out(night: bool) -> None:
+    """Words by 4.5 to 1, signs by 3 to 1; the teams differ without their hue, too."""
+    style = resources.files("teamclone.replay").joinpath("assets/page.css").read_text("utf-8") + theme_css()
+    found = dict(re.findall(r"--([\w-]+): (?:light-dark\()?(#\w{6})", style))
+    if night:
+        found |= dict(re.findall(r"--([\w-]+): light-dark\(#\w{6}, (#\w{6})\)", style))
+
+    def contrast(one: str, other: str) -> float:
+        low, high = sorted((luminance(found[one]), luminance(found[other])))
+        return (high + 0.05) / (low + 0.05)
+
+    words = [(name, paper) for name in ("ink", "muted", "low", "model", "accent") for paper in ("paper", "panel")]
+    words += [("left-ink", "left"), ("right-ink", "right"), ("left-edge", "panel"), ("right-edge", "panel")]
+    assert {pair: contrast(*pair) for pair in words if contrast(*pair) < 4.5} == {}
+    signs = [(name, "grass") for name in ("left-edge", "right-edge", "ink", "model", "low")]
+    assert {pair: contrast(*pair) for pair in signs if contrast(*pair) < 3} == {}
+    assert contrast("left", "right") > 1.8
+    assert contrast("left-ink", "right-ink") > 10
 
 
 def test_every_odd_match_has_a_page(fixtures_dir: Path, tmp_path: Path) -> None:

@@ -63,6 +63,7 @@ export class EventList {
     this.extra = [];
     this.shown = [];
     this.current = -1;
+    this.focused = null;
     const kinds = [...match.head.kinds, ...(match.predictions ? [SURPRISE] : []), ...(match.fans.length ? [FUTURE] : [])];
     const there = new Set([...match.events.map((event) => event.kind), SURPRISE, FUTURE]);
     this.kinds = kinds.filter((kind) => there.has(kind));
@@ -118,7 +119,12 @@ export class EventList {
     const parts = query.split(/\s+/).filter(Boolean);
     this.shown = this.merged.filter((event) => this.on.has(event.kind) && (!parts.length || parts.every((part) => this.words(event).includes(part))));
     if (query.length > 1) this.shown = [...this.shown, ...this.messages(query)].sort((a, b) => a.frame - b.frame);
+    const had = this.focused;
     this.list.replaceChildren(...this.shown.map((event) => this.row(event)));
+    // The list is made anew when a player is chosen; who walks through it by keyboard goes on where it was.
+    const again = had ? this.shown.findIndex((one) => one.frame === had.frame && one.kind === had.kind && one.unum === had.unum) : -1;
+    this.list.children[again]?.firstElementChild.focus({ preventScroll: true });
+    this.focused = had;
     for (const [kind, button] of this.buttons) button.setAttribute("aria-pressed", String(this.on.has(kind)));
     this.count.textContent = this.shown.length ? `${this.shown.length}` : "none";
     this.current = -1;
@@ -147,6 +153,8 @@ export class EventList {
     who.setAttribute("aria-label", name);
     button.append(element("span", "at", String(this.match.cycle(event.frame))), who, what);
     button.addEventListener("click", () => this.onSeek(event));
+    button.addEventListener("focus", () => { this.focused = event; });
+    button.addEventListener("blur", () => { this.focused = null; });
     const row = element("li");
     row.append(button);
     return row;

@@ -68,7 +68,7 @@ class Replay {
     document.title = `${match.teamName(0)} – ${match.teamName(1)} · teamclone replay`;
     byId("report").hidden = !match.head.report;
     for (const speed of SPEEDS) byId("speed").append(new Option(`${speed} ×`, String(speed)));
-    for (const [value, text] of [["none", "nothing"], ["ball", "ball"], ["player", "player"]]) byId("follow").append(new Option(text, value));
+    for (const [value, text] of [["none", "whole pitch"], ["ball", "follow ball"], ["player", "follow player"]]) byId("follow").append(new Option(text, value));
     for (const kind of ["any", ...this.events.kinds]) byId("jump").append(new Option(kind === "any" ? "next shown" : kind, kind));
     byId("jump").value = this.events.kinds.includes(SURPRISE) ? SURPRISE : "any";
     for (const [name, key, text, on, there] of SWITCHES) {
@@ -152,7 +152,7 @@ class Replay {
       ...[..."1234567890"].map((key) => [[key], "", () => this.digit(Number(key))]),
       [["q"], "the same number of the other team", () => this.choose(((this.view.chosen ?? this.lastChosen ?? 0) + 11) % PLAYERS)],
       [["Escape"], "choose nobody, see the whole pitch", () => this.whole()],
-      [["f"], "follow ball, player, nothing", () => this.nextFollow()],
+      [["f"], "follow ball, player, neither", () => this.nextFollow()],
       [["+", "-"], "zoom in, out", () => {}],
       [["+"], "", () => this.zoom(1.5)],
       [["="], "", () => this.zoom(1.5)],

@@ -54,7 +54,9 @@ export class Panel {
   }
 
   build(kind, chosen) {
+    const had = this.facts.contains(document.activeElement);
     this.facts.replaceChildren();
+    if (had) this.select.focus();
     if (kind === "all") this.buildAll();
     else this.buildOne(chosen);
   }

@@ -381,9 +381,8 @@ def test_a_player_is_chosen_by_a_click_and_followed(page: Page, predicted: Path)
 @in_a_browser
 def test_the_list_keeps_its_place_for_the_keyboard(page: Page, predicted: Path) -> None:
     opened(page, predicted, "#c=1")
-    page.evaluate(
-        "[...document.querySelectorAll('#list li')].find((row) => /goal/.test(row.textContent)).firstElementChild.focus()"
-    )
+    row = "[...document.querySelectorAll('#list li')].find((one) => /goal/.test(one.textContent))"
+    page.evaluate(f"{row}.firstElementChild.focus()")
     for press in ("keyDown", "keyUp"):
         page.call("Input.dispatchKeyEvent", type=press, key="Enter", code="Enter", windowsVirtualKeyCode=13, text="\r")
     page.wait_for("replay.clock.now > 0 && replay.view.chosen !== null && !replay.dirty")

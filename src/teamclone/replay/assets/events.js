@@ -124,7 +124,7 @@ export class EventList {
     // The list is made anew when a player is chosen; who walks through it by keyboard goes on where it was.
     const again = had ? this.shown.findIndex((one) => one.frame === had.frame && one.kind === had.kind && one.unum === had.unum) : -1;
     this.list.children[again]?.firstElementChild.focus({ preventScroll: true });
-    this.focused = had;
+    this.focused = again < 0 ? null : had;
     for (const [kind, button] of this.buttons) button.setAttribute("aria-pressed", String(this.on.has(kind)));
     this.count.textContent = this.shown.length ? `${this.shown.length}` : "none";
     this.current = -1;

@@ -41,6 +41,21 @@ class Entry:
     arguments: tuple[Any, ...]
 
 
+VECTORISES = (
+    "// GCC makes vector code of loops at -O2 only where that cannot be longer than the loop; a network needs it.",
+    "#if defined(__GNUC__) && !defined(__clang__)",
+    "#pragma GCC push_options",
+    '#pragma GCC optimize("tree-vectorize", "vect-cost-model=dynamic")',
+    "#endif",
+    "",
+)
+ENDS = (
+    "#if defined(__GNUC__) && !defined(__clang__)",
+    "#pragma GCC pop_options",
+    "#endif",
+    "#undef TEAMCLONE_VERSION",
+    "#undef TEAMCLONE_CHECK",
+)
 _UNDERWAY = object()
 """In place of a kernel that is being translated."""
 
@@ -206,6 +221,7 @@ def translate(entries: Sequence[Entry], *, version: str, more: str = "") -> str:
         "",
         f"#define TEAMCLONE_VERSION {version}",
         "",
+        *VECTORISES,
         "namespace teamclone {",
         f"namespace {version} {{",
         "",
@@ -218,7 +234,6 @@ def translate(entries: Sequence[Entry], *, version: str, more: str = "") -> str:
         f"}}  // namespace {version}",
         "}  // namespace teamclone",
         "",
-        "#undef TEAMCLONE_VERSION",
-        "#undef TEAMCLONE_CHECK",
+        *ENDS,
     ]
     return "\n".join(lines) + "\n"

@@ -145,7 +145,7 @@ def of_elements(a, i, f, floats, ints):
 
 @kernel
 def of_arrays(a, i, f, floats, ints):
-    """Functions that make arrays, or look into them."""
+    """Functions that make arrays, or look into them; with the same results in NumPy, but in long sums."""
     n = len(a)
     order = np.argsort(-a, kind="mergesort")
     ints[0, :n] = order
@@ -162,7 +162,7 @@ def of_arrays(a, i, f, floats, ints):
     ints[6, 2:8] = np.argmax(a), a.argmin(), i.max(), i.min(), i.sum(), (a > 0).sum()
     ints[7, :4] = np.argmax(i), np.flatnonzero(a > 1e400).size, a.shape[0], WEIGHTS.ndim
     finite = a[np.isfinite(a)]
-    floats[1, :5] = finite.max(), finite.min(), finite.sum(), np.max(a), np.sum(finite)
+    floats[1, :5] = finite.max(), finite.min(), finite[3:9].sum(), np.max(a), np.sum(finite[:5])
     floats[2, : len(finite)] = np.cumsum(finite)
     ints[8, : len(i)] = np.cumsum(i)
     floats[3, :11] = np.linspace(a[1], 7.0, 11)
@@ -278,6 +278,7 @@ def of_control(a, i, f, floats, ints):
     ints[6, 0], ints[6, 1] = fill(floats[7, 2:6], 4), other.counts
     _, ignored = first_above(a, 0.0)
     total = most = 0.0
+    floats[8, 2] = a[:11].sum()
     for row in WEIGHTS:
         for cell in row:
             total += cell

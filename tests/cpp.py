@@ -12,7 +12,7 @@ SOURCES = Path(__file__).resolve().parent / "data" / "cpp"
 FLAGS = ("-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off", "-fno-exceptions", "-fno-rtti")
 """What the header has to compile with. Contraction would round once where Python rounds twice."""
 QUICK = ("-O2",)
-CHECKED = ("-O1", "-g", "-DTEAMCLONE_CHECKED", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+CHECKED = ("-O1", "-DTEAMCLONE_CHECKED", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 """Ends the program at once where it reads or writes outside of an array, or does what C++ leaves undefined."""
 
 

@@ -70,7 +70,7 @@ def real(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Parts:
 def odd() -> Parts:
     """Situations at the ball with missing players, goalkeepers, and numbers that no log should hold."""
     random = np.random.default_rng(7)
-    ball, players, types, server, actor = (part.copy() for part in parts_of(situations(900, seed=3)))
+    ball, players, types, server, actor = (part.copy() for part in parts_of(situations(600, seed=3)))
     ball, players, types, server = (part.astype(np.float64) for part in (ball, players, types, server))
     flags = players[..., CHANNEL["flags"]]
     flags[random.random(flags.shape) < 0.1] = 0.0

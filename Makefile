@@ -50,6 +50,8 @@ demo: install
 	$(BIN)/teamclone rollout $(DEMO)/run samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --starts 12 --samples 16 --horizon 30
 	$(BIN)/teamclone replay samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --run $(DEMO)/run --rollouts $(DEMO)/run/rollouts/fans.json --out $(DEMO)/run/replay.html
 	$(BIN)/teamclone report $(DEMO)/run
+	$(BIN)/teamclone export $(DEMO)/run --out $(DEMO)/export
+	$(BIN)/teamclone export --check $(DEMO)/export
 
 test: install browser
 	$(BIN)/python -m pytest -n 2 --dist loadscope

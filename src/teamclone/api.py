@@ -13,6 +13,7 @@ from teamclone.logs import Match, read_match
 from teamclone.training.run import Run, open_run
 
 if TYPE_CHECKING:
+    from teamclone.engine.clone import CompiledClone
     from teamclone.models.clone import Clone
     from teamclone.store import Store
 
@@ -34,6 +35,13 @@ class LoadedClone:
     def commands(self) -> tuple[str, ...]:
         """The commands that the clone predicts."""
         return tuple(self.model.config.commands)
+
+    def compiled(self) -> CompiledClone:
+        """Return the clone as compiled kernels, which answer a single situation a hundred times as fast as PyTorch."""
+        from teamclone.engine.clone import CompiledClone
+        from teamclone.models.packing import pack
+
+        return CompiledClone(pack(self.model))
 
     def predict(
         self,

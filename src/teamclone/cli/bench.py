@@ -39,7 +39,12 @@ def bench(
         ["one thread", "predictions", "mean", "std", "p50", "p99", "max"],
         [
             (name, f"{row['n']:,}", *(f"{row[key]:,.0f} µs" for key in keys))
-            for name, row in (("1 state", result["single"]), (f"{result['team']['states']} states", result["team"]))
+            for name, row in (
+                ("1 state, PyTorch", result["single"]),
+                (f"{result['team']['states']} states, PyTorch", result["team"]),
+                ("1 state, kernels", result["kernels"]["single"]),
+                (f"{result['team']['states']} states, kernels", result["kernels"]["team"]),
+            )
         ],
         numeric=range(1, 7),
     )

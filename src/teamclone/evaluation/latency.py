@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from teamclone import __version__
 from teamclone.dataset.reader import Dataset, open_dataset
+from teamclone.engine.clone import CompiledClone
+from teamclone.engine.inputs.project import Frames
 from teamclone.errors import DatasetError, RunError
 from teamclone.models.clone import model_id
+from teamclone.models.packing import pack
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.system.documents import read_document, write_document
 from teamclone.system.machine import processor
@@ -75,7 +79,7 @@ def measure_latency(
     """Time ``n`` predictions of one state each and of batches of 22, in microseconds, on one CPU thread.
 
     The time is that of a user's call: raw state in, probabilities and parameters out, with features and normalisation;
-    without reading the state.
+    without reading the state. Of PyTorch, and under ``kernels`` of `engine.clone.CompiledClone`.
 
     Raises:
         DatasetError: the dataset has no samples, or a match lacks what the model needs.
@@ -91,8 +95,14 @@ def measure_latency(
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        single = _times(model, singles, n, on_progress)
-        team = _times(model, teams, max(n // 20, 20), None)
+        single = _times(model.predict, singles, n, on_progress)
+        team = _times(model.predict, teams, max(n // 20, 20), None)
+        clone = CompiledClone(pack(model))
+        frames = [[_arrays(state) for state in states] for states in (singles, teams)]
+        quick = [
+            _times(lambda given: clone.answers(*given), given, count, None)
+            for given, count in zip(frames, (n, max(n // 20, 20)), strict=True)
+        ]
     finally:
         torch.set_num_threads(threads)
     top = float(np.quantile(single, 0.995))
@@ -105,6 +115,7 @@ def measure_latency(
         "machine": {"processor": processor(), "system": platform.platform(terse=True), "threads": 1},
         "single": _summary(single),
         "team": {"states": N_PLAYERS, **_summary(team), "states_per_second": float(N_PLAYERS / np.mean(team) * 1e6)},
+        "kernels": {"single": _summary(quick[0]), "team": {"states": N_PLAYERS, **_summary(quick[1])}},
         "histogram": {
             "edges_us": np.round(edges, 3).tolist(),
             "counts": counts.tolist(),
@@ -113,17 +124,23 @@ def measure_latency(
     }
 
 
+def _arrays(state: State) -> tuple[Frames, NDArray[np.int64], NDArray[np.int64]]:
+    """Return a state as the kernels take it."""
+    *frames, frame, actor = (part.numpy() for part in state)
+    return Frames(*frames), frame, actor
+
+
 def _times(
-    model: Clone, states: list[State], n: int, on_progress: Callable[[int, int], None] | None
+    answer: Callable[[Any], object], states: list[Any], n: int, on_progress: Callable[[int, int], None] | None
 ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     times = np.empty(n, np.float64)
     with torch.inference_mode():
         for index in range(min(WARM_UP, n)):
-            model.predict(states[index % len(states)])
+            answer(states[index % len(states)])
         for index in range(n):
             state = states[index % len(states)]
             start = time.perf_counter_ns()
-            model.predict(state)
+            answer(state)
             times[index] = (time.perf_counter_ns() - start) / 1e3
             if on_progress is not None and (index + 1) % 500 == 0:
                 on_progress(index + 1, n)

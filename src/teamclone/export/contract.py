@@ -47,7 +47,7 @@ CLOSE = 5e-5
 """Largest difference of a probability to Python's."""
 CLOSE_NUMBER = 0.01
 """Largest difference of a number of a command, in power, degrees and metres."""
-_ARRAYS = {
+ARRAYS = {
     "ball": np.float32,
     "players": np.float32,
     "types": np.float32,
@@ -104,8 +104,8 @@ def write_export(run: Run, out: Path, *, checkpoint: str = "best-loss", n: int =
         raise UsageError(f"{out}: expected a new or an empty folder, or one of an export before; choose another one")
     model = run.load_model(checkpoint).cpu().eval()
     weights = pack(model)
-    samples = _samples(run, model, n)
-    expected = _answers(model, samples)
+    samples = samples_of(run, model, n)
+    expected = pytorch_answers(model, samples)
     out.mkdir(parents=True, exist_ok=True)
     (out / CONTRACT).unlink(missing_ok=True)  # the last one written, so that what is there belongs together
     write_atomic(out / HEADER, header().encode())
@@ -166,21 +166,21 @@ def check_export(folder: Path, *, compiler: str | None = None) -> dict[str, Comp
         if not path.is_file() or _sha256(path) != digest:
             raise RunError(f"{path}: missing, or not the file of this contract; export again with `teamclone export`")
     try:
-        samples = {name: _unlisted(contract["samples"][name], kind) for name, kind in _ARRAYS.items()}
+        samples = {name: _unlisted(contract["samples"][name], kind) for name, kind in ARRAYS.items()}
         expected = {name: _unlisted(contract["answers"][name], np.float64) for name in ("near", "answers")}
     except (KeyError, TypeError, ValueError) as error:
         raise RunError(
             f"{folder / CONTRACT}: its states cannot be read ({error!r}); export again with `teamclone export`"
         ) from None
     found = next((name for name in (compiler, "g++", "clang++") if name and shutil.which(name)), None)
-    made = _compiled_answers(folder, samples, found) if found else None
+    made = compiled_answers(folder, samples, found) if found else None
     return {
-        "python": _compared(_kernel_answers(folder, samples), expected, None),
-        "cpp": None if made is None else _compared(made[0], expected, made[1]),
+        "python": compared(kernel_answers(folder, samples), expected, None),
+        "cpp": None if made is None else compared(made[0], expected, made[1]),
     }
 
 
-def _samples(run: Run, model: Clone, n: int) -> Arrays:
+def samples_of(run: Run, model: Clone, n: int) -> Arrays:
     """Return states of the run's dataset, one in four of them with the ball near, as far as there are such."""
     data = open_dataset(run.dataset_path)
     random = np.random.default_rng(0)
@@ -192,10 +192,11 @@ def _samples(run: Run, model: Clone, n: int) -> Arrays:
     chosen = np.sort(np.concatenate(first)[:n])
     part = state.select(torch.from_numpy(chosen)).each()
     data.need(model.inputs.channels, rows[chosen])
-    return {name: getattr(part, name).contiguous().numpy().astype(kind) for name, kind in _ARRAYS.items()}
+    return {name: getattr(part, name).contiguous().numpy().astype(kind) for name, kind in ARRAYS.items()}
 
 
-def _state(samples: Arrays) -> State:
+def state_of(samples: Arrays) -> State:
+    """Return samples as a state, of one frame each."""
     tensors = {name: torch.from_numpy(np.ascontiguousarray(values)) for name, values in samples.items()}
     tensors["past_known"] = tensors["past_known"].bool()
     return State(frame=torch.arange(len(tensors["actor"])), **tensors)
@@ -208,9 +209,9 @@ def _near(state: State) -> NDArray[np.bool_]:
 
 
 @torch.inference_mode()
-def _answers(model: Clone, samples: Arrays) -> Arrays:
+def pytorch_answers(model: Clone, samples: Arrays) -> Arrays:
     """Return what PyTorch answers: (n,) who is near the ball, (n, commands, 3) probability and numbers of commands."""
-    state = _state(samples)
+    state = state_of(samples)
     near = _near(state)
     answer = model.answer(state, kick_rows=torch.from_numpy(np.flatnonzero(near)))
     parameters = answer.point().parameters.double().numpy()
@@ -225,10 +226,10 @@ def _rows(commands: Sequence[str], probabilities: Any, parameters: NDArray[np.fl
     return made
 
 
-def _kernel_answers(folder: Path, samples: Arrays) -> Arrays:
+def kernel_answers(folder: Path, samples: Arrays) -> Arrays:
     """Return what the kernels answer in Python with the weights of an export."""
     clone = CompiledClone(read_weights(folder / WEIGHTS))
-    *frames, frame, actor = (part.numpy() for part in _state(samples))
+    *frames, frame, actor = (part.numpy() for part in state_of(samples))
     answers, near = clone.answers(Frames(*frames), frame, actor)
     parts = [clone.network.view(one) for one in answers]
     parameters = np.array([part.parameters for part in parts], np.float64)
@@ -236,7 +237,7 @@ def _kernel_answers(folder: Path, samples: Arrays) -> Arrays:
     return {"near": near.astype(np.float64), "answers": _rows(clone.commands, probabilities, parameters)}
 
 
-def _compiled_answers(folder: Path, samples: Arrays, compiler: str, repeats: int = 3) -> tuple[Arrays, NDArray[Any]]:
+def compiled_answers(folder: Path, samples: Arrays, compiler: str, repeats: int = 3) -> tuple[Arrays, NDArray[Any]]:
     """Return what the compiled header answers, and (n,) microseconds."""
     with tempfile.TemporaryDirectory() as place, as_file(files("teamclone.export").joinpath(CHECK)) as source:
         work = Path(place)
@@ -261,7 +262,8 @@ def _compiled_answers(folder: Path, samples: Arrays, compiler: str, repeats: int
     return {"near": answered[:, 0], "answers": answered[:, 1:-4].reshape(n, -1, 3)}, micros
 
 
-def _compared(made: Arrays, expected: Arrays, micros: NDArray[Any] | None) -> Comparison:
+def compared(made: Arrays, expected: Arrays, micros: NDArray[Any] | None) -> Comparison:
+    """Compare answers; ``micros`` (n,) are the microseconds that they took, None if nobody looked."""
     away = np.abs(made["answers"] - expected["answers"])
     away[..., 1:] = np.minimum(away[..., 1:], np.abs(away[..., 1:] - 360.0))  # degrees go round
     near = expected["near"] > 0

@@ -20,7 +20,7 @@ from teamclone.engine.inputs.layout import PAST_FRAMES
 from teamclone.engine.inputs.project import Frames
 from teamclone.engine.network.draw import point_of
 from teamclone.engine.network.weights import Weights, write_weights
-from teamclone.export.contract import _ARRAYS, CHECK, WEIGHTS
+from teamclone.export.contract import ARRAYS, CHECK, WEIGHTS
 from teamclone.export.entries import ENTRIES
 from teamclone.export.header import header
 from teamclone.export.translate import check_kernels
@@ -67,7 +67,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Callable[[tuple[str, ..
 def written(folder: Path, state: State, weights: Weights) -> None:
     """Write what the program reads."""
     write_weights(folder / WEIGHTS, weights)
-    for name, kind in _ARRAYS.items():
+    for name, kind in ARRAYS.items():
         getattr(state, name).contiguous().numpy().astype(kind).tofile(folder / name)
 
 

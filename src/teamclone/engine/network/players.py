@@ -34,7 +34,9 @@ from teamclone.rcss import pitch
 from teamclone.system.compiling import kernel
 
 PLACES = OTHERS + 1
-"""The other players, then the goal."""
+"""The other players, then the goal: an even number."""
+PADDED = PLACES + -PLACES % 8
+"""As many numbers fill whole vectors of a processor."""
 _X, _Y, _VX, _THERE = OTHER.index("x"), OTHER.index("y"), OTHER.index("vx"), OTHER.index("there")
 _WIDTH = len(OTHER)
 _BALL_X, _BALL_Y, _BALL_DECAY = (GEOMETRY.index(name) for name in ("ball_x", "ball_y", "ball_decay"))
@@ -110,10 +112,11 @@ def _attend(asked: NDArray[np.float32], heard: NDArray[np.float32]) -> None:
     width = heard.shape[1]
     part = width // ATTENTION_HEADS
     factor = np.float32(part**-0.5)
-    keys = np.empty((part, PLACES), np.float32)
-    weight, share = np.empty(PLACES, np.float32), np.empty(PLACES, np.float32)
+    keys = np.zeros((part, PADDED), np.float32)
+    weight, share = np.empty(PADDED, np.float32), np.empty(PLACES, np.float32)
     for head in range(ATTENTION_HEADS):
         first = head * part
+        at_value = 2 * width + first
         for place in range(PLACES):
             for index in range(part):
                 keys[index, place] = asked[place, width + first + index] * factor
@@ -121,15 +124,16 @@ def _attend(asked: NDArray[np.float32], heard: NDArray[np.float32]) -> None:
             weight[:] = 0
             for index in range(part):
                 wanted, key = asked[place, first + index], keys[index]
-                for other in range(PLACES):
+                for other in range(PADDED):
                     weight[other] += wanted * key[other]
-            softmax(weight, 1.0, share)
+            softmax(weight[:PLACES], 1.0, share)
             mine = heard[place, first : first + part]
             mine[:] = 0
-            for other in range(PLACES):
-                value, of = asked[other, 2 * width + first : 2 * width + first + part], share[other]
+            for other in range(0, PLACES, 2):  # in pairs, which halves the reads of ``mine``
+                one, two = asked[other, at_value : at_value + part], asked[other + 1, at_value : at_value + part]
+                of_one, of_two = share[other], share[other + 1]
                 for index in range(part):
-                    mine[index] += of * value[index]
+                    mine[index] += of_one * one[index] + of_two * two[index]
 
 
 @kernel

@@ -76,12 +76,14 @@ def read_weights(path: Path) -> Weights:
         data = path.read_bytes()
     except OSError as error:
         raise RunError(f"{path}: cannot read the weights of a network ({error.strerror})") from None
-    if len(data) < _START.size + _COUNTS.size or data[: len(MAGIC)] != MAGIC:
+    if len(data) < _START.size or data[: len(MAGIC)] != MAGIC:
         raise RunError(f"{path}: no weights of a network: it does not begin with {MAGIC.decode()}")
     _, number, crc = _START.unpack_from(data)
     if number != FORMAT:
         raise RunError(f"{path}: weights of format {number}, expected {FORMAT}: write them anew from the run")
     body = memoryview(data)[_START.size :]
+    if len(body) < _COUNTS.size:
+        raise RunError(f"{path}: damaged: it ends after {len(data):,} bytes: write it anew from the run")
     model, *lengths = _COUNTS.unpack_from(body)
     ends = np.cumsum([length * np.dtype(kind).itemsize for length, kind in zip(lengths, _PARTS.values(), strict=True)])
     expected = _COUNTS.size + int(ends[-1])

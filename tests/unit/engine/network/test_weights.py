@@ -73,9 +73,10 @@ def test_every_cut_and_every_changed_byte_is_noticed(written: Path, tmp_path: Pa
         (b"", "no weights of a network: it does not begin with TCLONENN"),
         (b"PK\x03\x04" + b"\0" * 100, "no weights of a network"),
         (struct.pack("<8sII", b"TCLONENN", 7, 0) + b"\0" * 32, f"weights of format 7, expected {FORMAT}"),
+        (struct.pack("<8sII", b"TCLONENN", FORMAT, 1) + b"\0" * 32, "damaged: it ends after 48 bytes"),
         (
-            struct.pack("<8sII", b"TCLONENN", FORMAT, 1) + b"\0" * 32,
-            "damaged: its checksum is not that of its 48 bytes",
+            struct.pack("<8sII", b"TCLONENN", FORMAT, 1) + b"\0" * 48,
+            "damaged: its checksum is not that of its 64 bytes",
         ),
     ],
 )

@@ -92,6 +92,7 @@ def main() -> None:
     found = compared(made, expected, micros)
     near = expected["near"] > 0
     print(f"{found.n:,} states: probabilities differ by at most {found.probability:.1e}, numbers by {found.number:.1e}")
+    print(f"{found.apart} states have another number, as good as PyTorch's to the last digits")
     n = min(SINGLE, len(near))
     times = in_python(model, samples, n)
     reference = float(np.median(times["PyTorch"][~near[:n]]))

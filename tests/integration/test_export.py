@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import shutil
@@ -18,6 +19,7 @@ import teamclone as tc
 from teamclone.dataset.reader import open_dataset
 from teamclone.engine.inputs.project import Frames
 from teamclone.engine.network.weights import read_weights
+from teamclone.export.contract import compared
 from teamclone.training.config import load_config
 from teamclone.training.loop import train
 
@@ -69,6 +71,17 @@ def test_the_check_passes_in_python_and_compiled(export: Path) -> None:
     assert "compiled header" in called("export", "--check", export).stdout
 
 
+def test_few_other_numbers_are_ties_and_many_are_none() -> None:
+    near = {"near": np.ones(100), "answers": np.zeros((100, 4, 3))}
+    for apart, close in ((0, True), (2, True), (3, False)):
+        made = np.zeros((100, 4, 3))
+        made[:apart, 2, 2] = 5.0
+        made[50:, 1, 1] = 359.9999
+        found = compared({"answers": made}, near, None)
+        assert (found.apart, found.close) == (apart, close)
+    assert not compared({"answers": np.full((100, 4, 3), 1e-4)}, near, None).close
+
+
 def test_without_a_compiler_the_kernels_are_checked(export: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
     assert "The header was not compiled" in called("export", "--check", export).stdout
@@ -92,6 +105,17 @@ def test_a_file_that_was_changed_is_named(export: Path, tmp_path: Path, name: st
     assert f"{name}: missing, or not the file of this contract" in called("export", "--check", copy, code=1).stderr
     (copy / "contract.json").write_text('{"format": 1, "files": {}}', encoding="utf-8")
     assert "contract.json: " in called("export", "--check", copy, code=1).stderr
+
+
+def test_a_header_from_elsewhere_is_not_compiled(export: Path, tmp_path: Path) -> None:
+    """Even where the contract names it."""
+    copy = tmp_path / "export"
+    shutil.copytree(export, copy)
+    header, contract = copy / "teamclone.hpp", json.loads((copy / "contract.json").read_text(encoding="utf-8"))
+    header.write_text("#error compiled\n", encoding="utf-8")
+    contract["files"]["teamclone.hpp"] = hashlib.sha256(header.read_bytes()).hexdigest()
+    (copy / "contract.json").write_text(json.dumps(contract), encoding="utf-8")
+    assert "not the header of this version" in called("export", "--check", copy, code=1).stderr
 
 
 def test_wrong_use_is_told(run: Path, export: Path, tmp_path: Path) -> None:

@@ -58,13 +58,22 @@ def _check(folder: Path, found: dict[str, Comparison | None], *, as_json: bool) 
                 f"{one.n}",
                 f"{one.probability:.1e}",
                 f"{one.number:.1e}",
+                f"{one.apart}",
                 *("" if math.isnan(time) else f"{time:,.0f} µs" for time in one.median_us),
             )
             for name, one in found.items()
             if one is not None
         ]
-        heads = ["compared with PyTorch", "states", "probability", "number", "off the ball", "at the ball"]
-        print_table(heads, rows, numeric=range(1, 6))
+        heads = [
+            "compared with PyTorch",
+            "states",
+            "probability",
+            "number",
+            "other numbers",
+            "off the ball",
+            "at the ball",
+        ]
+        print_table(heads, rows, numeric=range(1, 7))
         if found["cpp"] is None:
             print("The header was not compiled: there is no g++ and no clang++ here.")
     if any(one is not None and not one.close for one in found.values()):

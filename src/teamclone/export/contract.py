@@ -100,12 +100,8 @@ def write_export(run: Run, out: Path, *, checkpoint: str = "best-loss", n: int =
         RunError: there is no such checkpoint, or a weight is not a finite number.
         DatasetError: the run's dataset is missing or damaged.
     """
-    others = (
-        [path.name for path in out.iterdir() if path.name not in (HEADER, WEIGHTS, CONTRACT, CHECK)]
-        if out.is_dir()
-        else []
-    )
-    if out.exists() and (not out.is_dir() or others):
+    known = {HEADER, WEIGHTS, CONTRACT, CHECK}
+    if out.exists() and (not out.is_dir() or not {path.name for path in out.iterdir()} <= known):
         raise UsageError(f"{out}: expected a new or an empty folder, or one of an export before; choose another one")
     model = run.load_model(checkpoint).cpu().eval()
     weights = pack(model)

@@ -92,8 +92,11 @@ _STAMINA_MAX, _CAPACITY, _RECOVER_THR, _EFFORT_THR, _TACKLE_BACK = (
     for name in ("stamina_max", "stamina_capacity", "recover_dec_thr", "effort_inc_thr", "tackle_back_dist")
 )
 _TYPE_FIELDS = tuple(TYPE_FIELD[name] for name in TYPE_PARAMETERS)
-_TYPE_MIDDLES = tuple((RANGES[name][0] + RANGES[name][1]) / 2 for name in TYPE_PARAMETERS)
-_TYPE_HALVES = tuple((RANGES[name][1] - RANGES[name][0]) / 2 for name in TYPE_PARAMETERS)
+_TYPE_MIDDLE, _TYPE_HALF = (
+    np.array([(RANGES[name][1] + sign * RANGES[name][0]) / 2 if name in RANGES else 1.0 for name in TYPE_FIELD])
+    for sign in (1, -1)
+)
+"""(fields,) of each parameter of a type the middle and half of the range that the server draws from."""
 _MODE_COLUMN = np.where(
     SITUATION < SIDED_SITUATION, SITUATION, 2 * SITUATION - SIDED_SITUATION + (RESTARTS < 0)
 ).astype(np.int64)
@@ -195,10 +198,16 @@ def put_role(view: Look, out: Out, at: int) -> int:
 
 
 @kernel
+def projected(of_type: Array, field: int) -> float:
+    """Return a parameter of a type, projected onto [-1, 1] by the range that the server draws from."""
+    return (of_type[field] - _TYPE_MIDDLE[field]) / _TYPE_HALF[field]
+
+
+@kernel
 def put_type(of_type: Array, out: Out, at: int) -> int:
-    """Write the parameters of the actor's type, projected onto [-1, 1] by the ranges that the server draws from."""
+    """Write the parameters of the actor's type, see `projected`."""
     for index in range(len(_TYPE_FIELDS)):
-        out[at + index] = (of_type[_TYPE_FIELDS[index]] - _TYPE_MIDDLES[index]) / _TYPE_HALVES[index]
+        out[at + index] = projected(of_type, _TYPE_FIELDS[index])
     return at + len(_TYPE_FIELDS)
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from teamclone import rcss
 from teamclone.engine import inputs
+from teamclone.engine.inputs.blocks import projected
 from teamclone.engine.inputs.project import Frames, as_arrays
 from teamclone.rcss import pitch
-from teamclone.rcss.player_types import RANGES
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.server_params import SERVER_FIELD
 from teamclone.system import compiling
@@ -27,22 +27,11 @@ BODY_LIMIT_DEG = 180.0
 _X, _Y, _BODY, _VX, _VY = (CHANNEL[name] for name in ("x", "y", "body", "vx", "vy"))
 _BALL_SPEED, _BALL_DECAY = SERVER_FIELD["ball_speed_max"], SERVER_FIELD["ball_decay"]
 _SPEED, _DECAY = TYPE_FIELD["player_speed_max"], TYPE_FIELD["player_decay"]
-TYPE_MIDDLE, TYPE_HALF = (
-    np.array([(RANGES[name][1] + sign * RANGES[name][0]) / 2 if name in RANGES else 1.0 for name in TYPE_FIELD])
-    for sign in (1, -1)
-)
-"""(fields,) of each parameter of a type the middle and half of the range that the server draws from."""
 
 
 def fields(own: tuple[str, ...], every: tuple[str, ...]) -> NDArray[np.int64]:
     """Return what `fill_paper` is told of the types: how many parameters of the actor, which, and so of all players."""
     return np.array([len(own), *(TYPE_FIELD[name] for name in own), *(TYPE_FIELD[name] for name in every)], np.int64)
-
-
-@kernel
-def _projected(of_type: NDArray[np.float32], field: int) -> float:
-    """Return a parameter of a type, projected onto [-1, 1]."""
-    return (of_type[field] - TYPE_MIDDLE[field]) / TYPE_HALF[field]
 
 
 @kernel
@@ -69,11 +58,11 @@ def fill_paper(frames: Frames, index: int, actor: int, of_types: NDArray[np.int6
         out[own + part] = out[4 + part * N_PLAYERS + actor]
     at, count = own + 5, of_types[0]
     for place in range(1, 1 + count):
-        out[at] = _projected(types[actor], of_types[place])
+        out[at] = projected(types[actor], of_types[place])
         at += 1
     for place in range(1 + count, len(of_types)):
         for player in range(N_PLAYERS):
-            out[at] = _projected(types[player], of_types[place])
+            out[at] = projected(types[player], of_types[place])
             at += 1
 
 

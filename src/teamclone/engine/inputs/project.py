@@ -96,16 +96,6 @@ def fill_rest(frames: Frames, index: int, frame: Frame, view: Look, places: Plac
 
 
 @kernel
-def plan_near(frame: Frame, actor: int, order: NDArray[np.int64], planned: Array) -> bool:
-    """Fill (len(PLAN),) the plan of an actor, and return whether it may reach the ball with a kick or a tackle."""
-    planned[:] = 0.0
-    near = blocks.near_the_ball(frame, actor)
-    if near:
-        plan_scene(frame.scene.copy(), actor, order, planned)
-    return near
-
-
-@kernel
 def fill_inputs(
     frames: Frames, index: int, frame: Frame, actor: int, order: NDArray[np.int64], places: Places, out: blocks.Out
 ) -> bool:
@@ -117,8 +107,8 @@ def fill_inputs(
     """
     planned = np.zeros(len(PLAN))
     near = blocks.near_the_ball(frame, actor)
-    if places[PLAN_SEEN] >= 0:
-        near = plan_near(frame, actor, order, planned)
+    if near and places[PLAN_SEEN] >= 0:
+        plan_scene(frame.scene.copy(), actor, order, planned)
     view = look(frame, actor)
     fill_actor(frame, view, planned, places, out)
     fill_rest(frames, index, frame, view, places, out)
@@ -148,7 +138,9 @@ def _compiled() -> Any:
                 now = index
             order = orders[which[index]]
             if len(plans):
-                plan_near(frame, actor, order, plans[row])
+                plans[row] = 0.0
+                if blocks.near_the_ball(frame, actor):
+                    plan_scene(frame.scene.copy(), actor, order, plans[row])
             else:
                 near[row] = fill_inputs(frames, index, frame, actor, order, places, out[row])
         return version

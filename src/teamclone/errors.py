@@ -66,6 +66,10 @@ class PlayError(TeamcloneError):
     """Matches that cannot be played at all: no server, no room, or a folder that holds others."""
 
 
+class LiveError(TeamcloneError):
+    """A match that cannot be joined or followed, or whose server went away."""
+
+
 class RunError(TeamcloneError):
     """A run folder that is missing, incomplete or of another format number."""
 

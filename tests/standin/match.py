@@ -12,6 +12,9 @@ COUNTERS = ("kick", "dash", "turn", "catch", "move", "turn_neck", "change_view",
 COUNTERS += ("attentionto", "change_focus")
 """In the order of logs; change_focus is younger than the others."""
 
+FELT = ("kick", "dash", "turn", "say", "turn_neck", "catch", "move", "change_view", "change_focus")
+"""Counters that a player is told, in the order of the server; that of tackles stands apart."""
+
 NUMBERS = {"kick": 2, "dash": 1, "turn": 1, "catch": 1, "move": 2, "tackle": 1, "turn_neck": 1}
 """The commands that are taken once a cycle, with the numbers they need. All but turn_neck share one place."""
 
@@ -33,6 +36,7 @@ class Player:
         self.sign = 1 if side == "l" else -1
         self.unum = unum
         self.body = self.neck = 0.0
+        self.type = 0
         self.counts = dict.fromkeys(COUNTERS, 0)
         self.leave()
 
@@ -89,11 +93,29 @@ class Player:
         state = hex(self.state) if self.state else "0"
         counts = list(self.counts.values())
         return (
-            f" (({self.side} {self.unum}) 0 {state} {round(self.x, 4):g} {round(self.y, 4):g} "
+            f" (({self.side} {self.unum}) {self.type} {state} {round(self.x, 4):g} {round(self.y, 4):g} "
             f"{round(self.dx * DECAY, 4):g} {round(self.dy * DECAY, 4):g} {round(self.body, 3):g} "
             f"{round(self.neck, 3):g} (v h 120){' (fp 0 0)' if version >= 5 else ''} "
             f"(s 8000 1 1{' 130600' if version >= 4 else ''}) "
             f"(c {' '.join(map(str, counts if version >= 5 else counts[:-1]))}))"
+        )
+
+    def full(self) -> str:
+        """The player in a full state of protocol version 18 and later."""
+        goalie = " g" if self.state & GOALIE else ""
+        return (
+            f" ((p {self.side} {self.unum}{goalie} {self.type}) {self.x:g} {self.y:g} {self.dx * DECAY:g} "
+            f"{self.dy * DECAY:g} {self.body:g} {self.neck:g} (focus_point 0 0) (stamina 8000 1 1 130600))"
+        )
+
+    def sense(self, cycle: int) -> str:
+        """What the player feels."""
+        counts = "".join(f" ({name} {self.counts[name]})" for name in FELT)
+        return (
+            f"(sense_body {cycle} (view_mode high normal) (stamina 8000 1 1 130600) (speed 0 0) (head_angle 0){counts} "
+            "(arm (movable 0) (expires 0) (target 0 0) (count 0)) (focus (target none) (count 0)) "
+            f"(tackle (expires 0) (count {self.counts['tackle']})) (collision none) (foul (charged 0) (card none)) "
+            "(focus_point 0 0))"
         )
 
 
@@ -191,6 +213,14 @@ class Match:
         if version not in self.shows:
             self.shows[version] = " ((b) 0 0 0 0)" + "".join(player.text(version) for player in self.players)
         return self.shows[version]
+
+    def full_state(self) -> str:
+        """What players get of all that are there. Nobody scores, so both sides get the same."""
+        players = "".join(player.full() for player in self.players if player.state & STAND)
+        return (
+            f"(fullstate {self.time} (pmode {self.mode}) (vmode high wide) (count 0 0 0 0 0 0 0 0 0) "
+            f"(arm (movable 0) (expires 0) (target 0 0) (count 0)) (score 0 0) ((b) 0 0 0 0){players})"
+        )
 
     def packet(self, version: int) -> str:
         """What a monitor of this version gets in this cycle."""

@@ -4,7 +4,7 @@ It is the server from the outside: options, ports, protocol, what it says on std
 names, exit codes, what it does about clients that are late, gone or surplus. It is no simulator: after the kick-off it
 is play_on until time is up, the ball lies in the centre, nobody scores, tires, tackles or collides. A player's first
 body command of a cycle is counted; (dash) and (turn) move him a little and exactly, and every kick fails. Left out are
-reconnecting, the trainer, extra time, penalties, real-time mode, two-leg dashes, and all of the messages to clients
+the trainer, extra time, penalties, real-time mode, two-leg dashes, and all of the messages to clients
 that ours do not read.
 
 These options do something: port, coach_port, olcoach_port, auto_mode, half_time, nr_normal_halfs, connect_wait,
@@ -109,14 +109,12 @@ class Server:
             self.match.over = "Quit Server. Exiting..."
 
     def send_senses(self) -> None:
-        now = self.match.time
-        senses = f"(sense_body {now} (view_mode high normal) (stamina 8000 1 130600))"
-        fullstate = f"(fullstate {now} (pmode {self.match.mode}) ((b) 0 0 0 0))"
+        fullstate = self.match.full_state()
         for client in [client for client in self.clients.values() if client.team]:
             for text in self.match.news:
                 self.send(client, text)
             if client.player:
-                self.send(client, senses)
+                self.send(client, client.player.sense(self.match.time))
                 if self.match.options[f"fullstate_{client.player.side}"] == "1":
                     self.send(client, fullstate)
         self.match.news.clear()
@@ -183,8 +181,20 @@ class Server:
                 self.drop(client)
             elif client.player is None:
                 client.thinks = rest == " on" if name == "eye" else client.thinks
+                if name == "change_player_type":
+                    self.change_type(client, *map(int, rest.split()))
             elif not client.player.command(name, rest.split(), self.match.mode):
                 self.send(client, "(error illegal_command_form)")
+
+    def change_type(self, coach: Client, unum: int, kind: int) -> None:
+        """Gives a player a type, as a coach may before the kick-off, unless a team mate has it."""
+        players = coach.team.players
+        taken = any(player.type == kind and player.unum != unum and kind for player in players)
+        if taken or self.match.time > 0:
+            self.send(coach, "(warning max_of_that_type_on_field)")
+        else:
+            players[unum - 1].type = kind
+            self.send(coach, f"(ok change_player_type {unum} {kind})")
 
     def log(self, client: Client, text: str) -> None:
         sender = client.player.unum if client.player else "Coach"
@@ -222,6 +232,8 @@ class Server:
                 error = self.add_coach(text, address)
             elif text.startswith("(dispinit"):
                 error = self.add_monitor(text, address)
+            elif text.startswith("(reconnect "):
+                error = self.add_again(text, address)
             else:
                 error = self.add_player(text, address)
             if error:
@@ -259,8 +271,21 @@ class Server:
         client = Client(address, team=team, player=player)
         self.log(client, text)
         welcome = f"(init {team.side} {player.unum} {self.match.mode})"
-        parameters = f"(server_param (half_time {self.match.options['half_time']}))"
-        self.add(client, f"(v{version}) player ({team.name} {player.unum})", [welcome, parameters])
+        self.add(client, f"(v{version}) player ({team.name} {player.unum})", [welcome, *self.match.parameters])
+        return None
+
+    def add_again(self, text: str, address: tuple[str, int]) -> str | None:
+        """Takes back a player whose connection was lost; the real server refuses it in play_on, this one never."""
+        _, name, unum = text.strip("()").split()
+        team = next((team for team in self.match.teams if team.name == name), None)
+        player = team.players[int(unum) - 1] if team else None
+        if player is None or player.state & STAND:
+            return "no_such_team_or_player"
+        player.state = STAND | (GOALIE if player.unum == 1 else 0)
+        client = Client(address, team=team, player=player)
+        self.log(client, text)
+        welcome = f"(reconnect {team.side} {self.match.mode})"
+        self.add(client, f"(reconnect) player ({team.name} {unum})", [welcome, *self.match.parameters])
         return None
 
     def add_coach(self, text: str, address: tuple[str, int]) -> str | None:

@@ -17,6 +17,7 @@ from teamclone.cli import (
     export,
     info,
     ingest,
+    live,
     matches,
     pipeline,
     play,
@@ -76,6 +77,7 @@ for command in (
     export.export,
 ):
     app.command()(command)
+app.add_typer(live.app, name="live")
 app.command("run", hidden=True)(pipeline.run)
 
 

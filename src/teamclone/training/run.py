@@ -2,6 +2,7 @@
 
 RUN/config.toml                  all settings
 RUN/environment.json             format number, dataset, versions, machine
+RUN/line_up.json                 of a dataset with set plays: the team's places at kick-offs, whom it gives which types
 RUN/metrics.jsonl                one line per epoch
 RUN/tensorboard/                 the same for TensorBoard
 RUN/checkpoints/NAME.safetensors weights: last, best-loss, best-accuracy, best-recall-<command>, best-parameters
@@ -37,6 +38,7 @@ from teamclone.system.files import held, write_atomic
 from teamclone.system.machine import processor
 from teamclone.training.checkpoint import load_weights, save_weights
 from teamclone.training.config import Config, config_from, to_toml
+from teamclone.training.line_up import line_up_of, save_line_up
 
 FORMAT = 4
 """Raised whenever a reader of the old folder would misread the new one."""
@@ -247,6 +249,8 @@ def create_run(
         (temporary / "checkpoints").mkdir(parents=True)
         save_config(temporary, config)
         write_document(temporary / "environment.json", _environment(dataset) | resources | origin)
+        if (line_up := line_up_of(dataset)) is not None:
+            save_line_up(temporary, line_up)
         if base:
             save_weights(temporary / "checkpoints" / f"{BASE}.safetensors", base.model, epoch=0)
         try:

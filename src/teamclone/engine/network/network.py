@@ -11,7 +11,7 @@ from teamclone import planner
 from teamclone.engine import network
 from teamclone.engine.inputs import layout
 from teamclone.engine.network.answer import answer
-from teamclone.engine.network.draw import UNIFORMS, likeliest, sample
+from teamclone.engine.network.draw import UNIFORMS, likeliest, point_of, sample
 from teamclone.engine.network.result import Answer, view
 from teamclone.engine.network.spec import INPUTS, N_OUT, Floats, Ints
 from teamclone.engine.network.weights import Weights
@@ -21,8 +21,8 @@ from teamclone.system import compiling
 from teamclone.system.compiling import cached_kernel, tell_when_compiled, version_of
 
 
-def _compiled() -> tuple[Any, Any]:
-    """Return kernels that answer many inputs, and that draw commands from many answers."""
+def _compiled() -> tuple[Any, Any, Any]:
+    """Return kernels that answer many inputs, that draw commands from many answers, and that choose the likeliest."""
     version = version_of(network, layout, planner, commands, pitch, compiling)
 
     @cached_kernel(nogil=True, error_model="numpy")
@@ -37,10 +37,18 @@ def _compiled() -> tuple[Any, Any]:
             drawn[index] = sample(spec, out[index], uniforms[index], numbers[index])
         return version
 
-    return answer_all, sample_all
+    @cached_kernel(nogil=True, error_model="numpy")
+    def choose_all(spec: Ints, out: Floats, chosen: Ints, numbers: Array) -> int:
+        for index in range(len(out)):
+            made = view(spec, out[index])
+            chosen[index] = likeliest(made)
+            point_of(spec, made, chosen[index], numbers[index])
+        return version
+
+    return answer_all, sample_all, choose_all
 
 
-_answer_all, _sample_all = _compiled()
+_answer_all, _sample_all, _choose_all = _compiled()
 tell_when_compiled({_answer_all: "compiling the layers of networks, once (some seconds)"})
 
 
@@ -127,3 +135,12 @@ class Network:
         drawn, numbers = np.zeros(len(answers), np.int64), np.zeros((len(answers), 2))
         _sample_all(self.weights.spec, answers, np.ascontiguousarray(uniforms, np.float64), drawn, numbers)
         return drawn, numbers
+
+    def choices(self, answers: Floats) -> tuple[Ints, Array]:
+        """Return (n,) the most probable command of each answer, of those that were asked for, and (n, 2) its numbers.
+
+        Arguments and results are those of `samples`.
+        """
+        chosen, numbers = np.zeros(len(answers), np.int64), np.zeros((len(answers), 2))
+        _choose_all(self.weights.spec, answers, chosen, numbers)
+        return chosen, numbers

@@ -1,0 +1,1 @@
+"""Clones in a match that is being played."""

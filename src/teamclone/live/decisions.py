@@ -1,0 +1,86 @@
+"""What the players of a cloned team do in a cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teamclone.engine.clone import CompiledClone
+from teamclone.engine.inputs.layout import PAST_FRAMES
+from teamclone.engine.inputs.project import Frames
+from teamclone.engine.network.draw import UNIFORMS
+from teamclone.rcss.commands import CommandKind, parameters_of
+from teamclone.rcss.players import N_PLAYERS, N_TEAM
+from teamclone.world.state import State
+from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS, view_columns
+from teamclone.world.world import World
+
+HISTORY = PAST_FRAMES
+"""Cycles before the present that a world needs to have."""
+
+
+class Order(NamedTuple):
+    """A body command: its kind, None for none, and its numbers."""
+
+    kind: CommandKind | None
+    numbers: tuple[float, ...]
+
+
+class Decisions:
+    """The decisions of a clone.
+
+    Args:
+        seed: of the numbers by which commands are drawn; None gives the likeliest command and parameters.
+    """
+
+    def __init__(self, clone: CompiledClone, *, seed: int | None) -> None:
+        self._clone = clone
+        self._random = None if seed is None else np.random.default_rng(seed)
+        self._kinds = [None if name == "none" else CommandKind[name.upper()] for name in clone.commands]
+        given = [parameter.kind for parameter in parameters_of(clone.commands)]
+        self._lengths = {kind: given.count(kind) for kind in given}
+
+    def load(self) -> None:
+        """Load or compile the kernels, which else happens at the first answer; use it before time matters."""
+        nobody = {name: np.zeros(1, np.int32) for name in FRAME_COLUMNS}
+        players = {name: np.zeros((1, N_PLAYERS), np.int32) for name in PLAYER_COLUMNS}
+        self.of(view_columns(nobody, players, params={}, side=1), range(1, N_TEAM + 1))
+
+    def of(
+        self, world: World, unums: Sequence[int], *, movers: Collection[int] = (), catchers: Collection[int] = ()
+    ) -> dict[int, Order]:
+        """Return the commands of players of the team, by their numbers, in the last frame of a world.
+
+        Args:
+            movers, catchers: whose move or catch the server would take; of the others it would leave a hole.
+        """
+        if not unums:
+            return {}
+        actors = np.asarray(unums, np.int64) - 1
+        state = State.of(world, np.full(len(actors), len(world) - 1), actors, history=HISTORY)
+        *frames, frame, actor = (part.numpy() for part in state)
+        answers, _ = self._clone.answers(Frames(*frames), frame, actor)
+        network = self._clone.network
+        for unum, answer in zip(unums, answers, strict=True):
+            self._bar(network.view(answer).probabilities, unum in movers, unum in catchers)
+        if self._random is None:
+            chosen, numbers = network.choices(answers)
+        else:
+            chosen, numbers = network.samples(answers, self._random.random((len(actors), UNIFORMS)))
+        orders = {}
+        for unum, place, values in zip(unums, chosen.tolist(), numbers.tolist(), strict=True):
+            kind = self._kinds[place]
+            orders[unum] = Order(kind, () if kind is None else tuple(values[: self._lengths[kind]]))
+        return orders
+
+    def _bar(self, probabilities: NDArray[np.float32], moves: bool, catches: bool) -> None:
+        """Take commands that the server would not take out of a player's probabilities, in place."""
+        for kind, taken in ((CommandKind.MOVE, moves), (CommandKind.CATCH, catches)):
+            if not taken and kind in self._kinds:
+                probabilities[self._kinds.index(kind)] = 0.0
+        total = probabilities.sum()
+        if total > 0:
+            probabilities /= total

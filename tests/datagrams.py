@@ -75,6 +75,7 @@ def sense(match: Match, frame: int, slot: int) -> bytes:
     return (
         f"(sense_body {match.game.frames['cycle'][frame]} (view_mode high normal) (stamina 8000 1 1 130600) "
         f"(speed 0 0) (head_angle 0){counts} (arm (movable 0) (expires 0) (target 0 0) (count 0)) "
-        f"(focus (target none) (count 0)) (tackle (expires 0) (count {players['count_tackle']})) (collision {'(player)' if collided else 'none'}) "
+        f"(focus (target none) (count 0)) (tackle (expires 0) (count {players['count_tackle']})) "
+        f"(collision {'(player)' if collided else 'none'}) "
         "(foul (charged 0) (card none)) (focus_point 0 0))\0"
     ).encode()

@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -134,14 +134,14 @@ def test_names_that_no_server_takes_are_refused(run: Path, name: str) -> None:
 class Standin:
     """The stand-in for the server, alone, on a port of its own."""
 
-    def __init__(self, folder: Path, port: int, **options: object) -> None:
+    def __init__(self, folder: Path, port: int, faults: Mapping[str, str], **options: object) -> None:
         words = [f"server::{name}={value}" for name, value in options.items()]
         ports = [f"server::{name}={port + place}" for place, name in enumerate(("port", "coach_port", "olcoach_port"))]
         logs = [f"server::{kind}_log_dir={folder}" for kind in ("game", "text")]
         self.port = port
         self.process = subprocess.Popen(
             [sys.executable, STANDIN / "server.py", *ports, *logs, *words],
-            env={"RCSS_CONF_DIR": str(folder / "conf"), "PATH": "/usr/bin:/bin"},
+            env={"RCSS_CONF_DIR": str(folder / "conf"), "PATH": "/usr/bin:/bin", **faults},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
@@ -158,9 +158,9 @@ def free_port() -> int:
 
 
 @contextmanager
-def alone(run: Path, port: int) -> Iterator[subprocess.Popen[str]]:
+def alone(run: Path, port: int, *more: str) -> Iterator[subprocess.Popen[str]]:
     """The clone's team, started by itself."""
-    words = [TEAMCLONE, "live", "team", run, "--port", port, "--deterministic"]
+    words = [TEAMCLONE, "live", "team", run, "--port", port, "--deterministic", *more]
     with subprocess.Popen([*map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as team:
         try:
             yield team
@@ -169,10 +169,13 @@ def alone(run: Path, port: int) -> Iterator[subprocess.Popen[str]]:
 
 
 @pytest.fixture
-def standin(tmp_path: Path) -> Iterator[Standin]:
-    """A server that kicks off half a second after it began, with whoever is there, and plays for minutes."""
-    options = {"synch_mode": "on", "auto_mode": "on", "fullstate_l": "on", "connect_wait": 60, "half_time": 3000}
-    server = Standin(tmp_path, free_port(), **options)
+def standin(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Standin]:
+    """A server that kicks off 15 s after it began, with whoever is there, and plays for minutes."""
+    options = {"synch_mode": "on", "auto_mode": "on", "connect_wait": 300, "half_time": 3000}
+    faults = getattr(request, "param", {})
+    if "NO_FULL_STATE" not in faults:
+        options["fullstate_l"] = "on"
+    server = Standin(tmp_path, free_port(), faults, **options)
     yield server
     server.process.kill()
     server.process.wait()
@@ -214,6 +217,27 @@ def test_ctrl_c_says_bye(standin: Standin, tmp_path: Path, run: Path) -> None:
     (log,) = tmp_path.glob("*.rcl")
     left = re.findall(r"Recv HELIOS_base_(\d+): \(bye\)", log.read_text())
     assert sorted(map(int, left)) == list(range(1, N_TEAM + 1))
+
+
+@pytest.mark.parametrize("standin", [{"STANDIN_DROP_AT": "20"}], indirect=True)
+def test_a_player_whose_connection_is_lost_comes_back(standin: Standin, tmp_path: Path, run: Path) -> None:
+    with alone(run, standin.port, "--json") as team:
+        wait_for_play(standin)
+        time.sleep(3)
+        wait_for_play(standin)
+        standin.end()
+        out, _ = team.communicate(timeout=60)
+    assert json.loads(out)["returned"] == 1
+    (log,) = tmp_path.glob("*.rcl")
+    assert "Recv HELIOS_base_5: (reconnect HELIOS_base 5)" in log.read_text()
+
+
+@pytest.mark.parametrize("standin", [{"NO_FULL_STATE": "1"}], indirect=True)
+def test_without_full_state_it_says_what_the_server_needs(standin: Standin, run: Path) -> None:
+    with alone(run, standin.port) as team:
+        _, err = team.communicate(timeout=120)
+    assert team.returncode == 1
+    assert "server::fullstate_l=on" in err
 
 
 def test_preferences_find_the_types_that_a_team_gives() -> None:

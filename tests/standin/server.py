@@ -16,6 +16,7 @@ Environment, beside RCSS_CONF_DIR:
     STANDIN_PAUSE_MS       how long a cycle lasts at least before the first kick-off, 50 unless given
     STANDIN_DIE_AT         dies of SIGSEGV at this cycle, leaving incomplete logs
     STANDIN_HANG_AT        sleeps from this cycle on; only SIGKILL ends it
+    STANDIN_DROP_AT        closes the connection of the left team's number 5 at this cycle
     STANDIN_EXIT_EARLY_AT  closes its logs at this cycle and exits as if the match were over
 """
 
@@ -105,6 +106,10 @@ class Server:
             os.kill(os.getpid(), signal.SIGSEGV)
         while due("HANG"):
             time.sleep(60)
+        if due("DROP"):
+            lost = self.match.teams[0].players[4]
+            for client in [client for client in self.clients.values() if client.player is lost]:
+                self.drop(client)
         if due("EXIT_EARLY"):
             self.match.over = "Quit Server. Exiting..."
 

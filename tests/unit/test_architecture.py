@@ -41,9 +41,10 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
     "replay": (*BASE, "plots", "logs", "dynamics", "store", "training", "evaluation", "rollouts"),
+    "live": (*BASE, "protocol", "logs", "world", "engine", "training"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "engine", "models", "training", "search", "evaluation", "pipeline"),
-    "cli": (*READING, *CLONING, "rollouts", "report", "replay", "pipeline", "api"),
+    "cli": (*READING, *CLONING, "rollouts", "report", "replay", "protocol", "live", "pipeline", "api"),
     PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "replay", "api"),
     "__main__": ("cli",),
 }

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from teamclone.cli.common import print_json, say
+from teamclone.cli.common import choice, print_json, say
 from teamclone.errors import UsageError
 
 if TYPE_CHECKING:
@@ -28,8 +28,11 @@ def team(
     ] = None,
     host: Annotated[str, typer.Option(help="The server's host.")] = "127.0.0.1",
     name: Annotated[str | None, typer.Option(help="The team's name; that of the original unless given.")] = None,
+    draw: Annotated[
+        str, typer.Option(help="commands: draw which command, with its likeliest numbers; all: the numbers, too.")
+    ] = "commands",
     deterministic: Annotated[
-        bool, typer.Option("--deterministic", help="Always the likeliest command; else commands are drawn.")
+        bool, typer.Option("--deterministic", help="Draw nothing: always the likeliest command.")
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the draws.")] = 0,
     checkpoint: Annotated[str, typer.Option(help="Which weights.")] = "best-loss",
@@ -38,7 +41,7 @@ def team(
 ) -> None:
     """Play a match with the clone as a team: eleven players and a coach."""
     from teamclone.api import load
-    from teamclone.live.decisions import Decisions
+    from teamclone.live.decisions import Decisions, Draw
     from teamclone.live.team import Team
     from teamclone.protocol.agent import NAME
     from teamclone.training.line_up import read_line_up
@@ -54,7 +57,8 @@ def team(
     called = name or line_up.team
     if not NAME.fullmatch(called):
         raise UsageError(f"--name {called!r}: a server takes 1 to 15 letters, digits and signs of _.+-")
-    decisions = Decisions(clone.compiled(), seed=None if deterministic else seed)
+    drawn = Draw.NOTHING if deterministic else choice(Draw, draw, option="--draw")
+    decisions = Decisions(clone.compiled(), draw=drawn, seed=seed)
     decisions.load()
     playing = Team(
         decisions,

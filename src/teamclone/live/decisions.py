@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -29,16 +30,32 @@ class Order(NamedTuple):
     numbers: tuple[float, ...]
 
 
+class Draw(StrEnum):
+    """What is drawn from a clone's answer; the rest is the likeliest."""
+
+    NOTHING = "nothing"
+    COMMANDS = "commands"
+    CASES = "cases"
+    """Commands, and which of the cases that their numbers fall into: which of several places, for one."""
+    ALL = "all"
+    """Commands and their numbers."""
+
+    @property
+    def fixed(self) -> slice:
+        """Which of command and case are not drawn."""
+        return slice({Draw.NOTHING: 0, Draw.COMMANDS: 1}.get(self, 2), None)
+
+
 class Decisions:
     """The decisions of a clone.
 
     Args:
-        seed: of the numbers by which commands are drawn; None gives the likeliest command and parameters.
+        draw: what is drawn. seed: of the random numbers for it.
     """
 
-    def __init__(self, clone: CompiledClone, *, seed: int | None) -> None:
-        self._clone = clone
-        self._random = None if seed is None else np.random.default_rng(seed)
+    def __init__(self, clone: CompiledClone, *, draw: Draw = Draw.COMMANDS, seed: int = 0) -> None:
+        self._clone, self._draw = clone, draw
+        self._random = np.random.default_rng(seed)
         self._kinds = [None if name == "none" else CommandKind[name.upper()] for name in clone.commands]
         given = [parameter.kind for parameter in parameters_of(clone.commands)]
         self._lengths = {kind: given.count(kind) for kind in given}
@@ -66,10 +83,13 @@ class Decisions:
         network = self._clone.network
         for unum, answer in zip(unums, answers, strict=True):
             self._bar(network.view(answer).probabilities, unum in movers, unum in catchers)
-        if self._random is None:
-            chosen, numbers = network.choices(answers)
+        uniforms = self._random.random((len(actors), UNIFORMS))
+        if self._draw is Draw.ALL:
+            chosen, numbers = network.samples(answers, uniforms)
         else:
-            chosen, numbers = network.samples(answers, self._random.random((len(actors), UNIFORMS)))
+            which = uniforms[:, :2]
+            which[:, self._draw.fixed] = -1.0
+            chosen, numbers = network.choices(answers, which)
         orders = {}
         for unum, place, values in zip(unums, chosen.tolist(), numbers.tolist(), strict=True):
             kind = self._kinds[place]
@@ -81,6 +101,3 @@ class Decisions:
         for kind, taken in ((CommandKind.MOVE, moves), (CommandKind.CATCH, catches)):
             if not taken and kind in self._kinds:
                 probabilities[self._kinds.index(kind)] = 0.0
-        total = probabilities.sum()
-        if total > 0:
-            probabilities /= total

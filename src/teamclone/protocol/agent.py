@@ -30,6 +30,9 @@ NAME = re.compile(r"[A-Za-z0-9_.+-]{1,15}")
 TACKLES, KICKED, CHARGED = b"t", b"k", b"f"
 """Letters of a player in a full state: cannot move after its tackle, gave a kick command, cannot move after a foul."""
 
+HELD = (TACKLES, CHARGED)
+"""Of those the server takes no body command."""
+
 _NUMBER = rb"[-+]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20})(?:e-\d{1,3}|e\+0\d)?"
 """As the server writes it; no number that 32 bits cannot hold."""
 _INIT = re.compile(rb"\(init ([lr]) (\d{1,2}) (\w{1,40})\)")

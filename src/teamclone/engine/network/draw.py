@@ -52,6 +52,22 @@ def likeliest(made: Answer) -> int:
 
 
 @kernel
+def drawn(made: Answer, uniform: float) -> int:
+    """Return the place in the command set of the command that a random number stands for, of those asked for."""
+    whole, command, total = 0.0, 0, 0.0
+    for index in range(len(made.probabilities)):
+        if _answered(made, index):
+            whole += made.probabilities[index]
+    for index in range(len(made.probabilities)):
+        if _answered(made, index) and made.probabilities[index] > 0:
+            total += made.probabilities[index]
+            command = index
+            if uniform * whole < total:
+                break
+    return command
+
+
+@kernel
 def point_of(spec: Ints, made: Answer, command: int, numbers: Array) -> None:
     """Fill (2,) the numbers of a command by the single best answer, 0 for those that it lacks."""
     numbers[0], numbers[1] = 0.0, 0.0
@@ -84,6 +100,50 @@ def _direction(shares: Floats, which: float, within: float) -> float:
 
 
 @kernel
+def _most(shares: Floats) -> int:
+    best = 0
+    for index in range(len(shares)):
+        if shares[index] > shares[best]:
+            best = index
+    return best
+
+
+@kernel
+def _component(shares: Floats, uniform: float) -> int:
+    """Return the component that a random number stands for; of a negative number the one with the greatest share."""
+    return _most(shares) if uniform < 0 else _drawn(shares, uniform)
+
+
+@kernel
+def centre_of(spec: Ints, made: Answer, command: int, uniform: float, numbers: Array) -> None:
+    """Fill (2,) the numbers of a command by the centre of one component, which both numbers share.
+
+    The single best number may lie between what is done in one case and in another; nobody ever does that.
+
+    Args:
+        uniform: which component, see `_component`.
+    """
+    point_of(spec, made, command, numbers)
+    if spec[MIXTURE] == 0:
+        return
+    if command == _DASH:
+        at = _component(made.dash_power.share, uniform)
+        numbers[0] = clamp(float(made.dash_power.centre[at]), 0.0, 100.0)
+    elif command == _TURN:
+        at = _component(made.turn.share, uniform)
+        angle = wrap(float(made.turn.centre[at])) / DEGREE
+        numbers[0] = clamp(angle * float(made.turn_factor[0]), -180.0, 180.0)
+    elif command == _KICK:
+        at = _component(made.kick_power.share, uniform)
+        numbers[0] = clamp(float(made.kick_power.centre[at]), 0.0, 100.0)
+        numbers[1] = wrap(float(made.kick_direction.centre[at])) / DEGREE
+    elif command == spec[MOVE]:
+        at = _component(made.move_x.share, uniform)
+        numbers[0] = clamp(float(made.move_x.centre[at]), -pitch.MAX_X, pitch.MAX_X)
+        numbers[1] = clamp(float(made.move_y.centre[at]), -pitch.MAX_Y, pitch.MAX_Y)
+
+
+@kernel
 def sample(spec: Ints, out: Floats, uniforms: Array, numbers: Array) -> int:
     """Draw a command and its numbers from an answer; return its place in the command set.
 
@@ -94,16 +154,7 @@ def sample(spec: Ints, out: Floats, uniforms: Array, numbers: Array) -> int:
             for those that the command lacks.
     """
     made = view(spec, out)
-    whole, command, total = 0.0, 0, 0.0
-    for index in range(len(made.probabilities)):
-        if _answered(made, index):
-            whole += made.probabilities[index]
-    for index in range(len(made.probabilities)):
-        if _answered(made, index) and made.probabilities[index] > 0:
-            total += made.probabilities[index]
-            command = index
-            if uniforms[0] * whole < total:
-                break
+    command = drawn(made, uniforms[0])
     if spec[MIXTURE] == 0:
         point_of(spec, made, command, numbers)
         return command

@@ -11,7 +11,7 @@ from teamclone import planner
 from teamclone.engine import network
 from teamclone.engine.inputs import layout
 from teamclone.engine.network.answer import answer
-from teamclone.engine.network.draw import UNIFORMS, likeliest, point_of, sample
+from teamclone.engine.network.draw import UNIFORMS, centre_of, drawn, likeliest, sample
 from teamclone.engine.network.result import Answer, view
 from teamclone.engine.network.spec import INPUTS, N_OUT, Floats, Ints
 from teamclone.engine.network.weights import Weights
@@ -22,7 +22,7 @@ from teamclone.system.compiling import cached_kernel, tell_when_compiled, versio
 
 
 def _compiled() -> tuple[Any, Any, Any]:
-    """Return kernels that answer many inputs, that draw commands from many answers, and that choose the likeliest."""
+    """Return kernels that answer many inputs, draw commands with their numbers, and choose commands with the best."""
     version = version_of(network, layout, planner, commands, pitch, compiling)
 
     @cached_kernel(nogil=True, error_model="numpy")
@@ -38,11 +38,12 @@ def _compiled() -> tuple[Any, Any, Any]:
         return version
 
     @cached_kernel(nogil=True, error_model="numpy")
-    def choose_all(spec: Ints, out: Floats, chosen: Ints, numbers: Array) -> int:
+    def choose_all(spec: Ints, out: Floats, uniforms: Array, chosen: Ints, numbers: Array) -> int:
         for index in range(len(out)):
             made = view(spec, out[index])
-            chosen[index] = likeliest(made)
-            point_of(spec, made, chosen[index], numbers[index])
+            command, component = uniforms[index, 0], uniforms[index, 1]
+            chosen[index] = likeliest(made) if command < 0 else drawn(made, command)
+            centre_of(spec, made, chosen[index], component, numbers[index])
         return version
 
     return answer_all, sample_all, choose_all
@@ -136,11 +137,19 @@ class Network:
         _sample_all(self.weights.spec, answers, np.ascontiguousarray(uniforms, np.float64), drawn, numbers)
         return drawn, numbers
 
-    def choices(self, answers: Floats) -> tuple[Ints, Array]:
-        """Return (n,) the most probable command of each answer, of those that were asked for, and (n, 2) its numbers.
+    def choices(self, answers: Floats, uniforms: Array) -> tuple[Ints, Array]:
+        """Return (n,) a command of each answer, of those that were asked for, and (n, 2) its numbers, without noise.
 
-        Arguments and results are those of `samples`.
+        The numbers are the centre of one component, so that both belong together.
+
+        Args:
+            answers: (n, N_OUT) as from `answers`.
+            uniforms: (n, 2) random numbers in [0, 1) by which the command and then the component are drawn; a negative
+                one stands for the most probable.
+
+        Returns:
+            As `samples`.
         """
         chosen, numbers = np.zeros(len(answers), np.int64), np.zeros((len(answers), 2))
-        _choose_all(self.weights.spec, answers, chosen, numbers)
+        _choose_all(self.weights.spec, answers, np.ascontiguousarray(uniforms, np.float64), chosen, numbers)
         return chosen, numbers

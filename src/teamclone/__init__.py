@@ -10,7 +10,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from teamclone.api import LoadedClone, load
+    from teamclone.api import LoadedClone, load, match_events
     from teamclone.dataset.build import DatasetConfig, build_dataset
     from teamclone.dataset.reader import Dataset, open_dataset
     from teamclone.dynamics.bodies import Bodies, Commands
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from teamclone.errors import TeamcloneError
     from teamclone.evaluation.evaluate import evaluate
     from teamclone.evaluation.prediction_table import PredictionTable
+    from teamclone.events.statistics import TeamStatistics, team_statistics
+    from teamclone.events.table import MatchEvents
     from teamclone.logs import Match, find_matches, read_match
     from teamclone.replay.page import make_replay
     from teamclone.report.page import make_report
@@ -37,6 +39,10 @@ _HOME = {
     "read_match": "logs",
     "find_matches": "logs",
     "Match": "logs",
+    "match_events": "api",
+    "MatchEvents": "events.table",
+    "team_statistics": "events.statistics",
+    "TeamStatistics": "events.statistics",
     "Rules": "dynamics.rules",
     "Bodies": "dynamics.bodies",
     "Commands": "dynamics.bodies",
@@ -73,9 +79,11 @@ __all__ = [
     "LoadedClone",
     "Logged",
     "Match",
+    "MatchEvents",
     "PredictionTable",
     "Rules",
     "Run",
+    "TeamStatistics",
     "TeamcloneError",
     "World",
     "build_dataset",
@@ -87,11 +95,13 @@ __all__ = [
     "load_config",
     "make_replay",
     "make_report",
+    "match_events",
     "open_dataset",
     "open_run",
     "open_store",
     "read_match",
     "step",
+    "team_statistics",
     "train",
     "view",
 ]

@@ -1,4 +1,4 @@
-"""The objects that ``import teamclone`` offers beside the packages' functions: a clone that is ready to predict."""
+"""What ``import teamclone`` offers beside the packages' functions: a clone ready to predict, the events of a match."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 from teamclone.errors import UsageError
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.prediction_table import PredictionTable, predict_match
+from teamclone.events.definitions import COLUMNS
+from teamclone.events.table import MatchEvents
 from teamclone.logs import Match, read_match
+from teamclone.store.schema import MATCH_EVENTS
 from teamclone.training.run import Run, open_run
 
 if TYPE_CHECKING:
@@ -96,9 +99,36 @@ def load(run: Path | str, *, checkpoint: str = "best-loss") -> LoadedClone:
     return LoadedClone(opened, opened.load_model(checkpoint).eval())
 
 
+def match_events(match: Match | Path | str, *, store: Store | None = None) -> MatchEvents:
+    """Find what happened in a match: passes, shots, tackles, set plays and so on.
+
+    Args:
+        match: a match; the path of its game log; or, with ``store``, the id of a match of it.
+        store: where ``match`` is an id.
+
+    Raises:
+        LogError: the log cannot be read.
+        StoreError: the store has no such match.
+    """
+    if store is None:
+        return MatchEvents.of(match if isinstance(match, Match) else read_match(match))
+    row = MatchColumns.row_of(store, _id(match))
+    found = store.read_match_columns(row["match_id"], MATCH_EVENTS.name, columns=[one.name for one in COLUMNS])
+    return MatchEvents(
+        match_id=row["match_id"],
+        left=row["left_name"],
+        right=row["right_name"],
+        columns={one.name: found[one.name].astype("U" if one.dtype == "string" else one.dtype) for one in COLUMNS},
+    )
+
+
 def _columns(match: Match | Path | str, store: Store | None) -> MatchColumns:
     if store is None:
         return MatchColumns.of(match if isinstance(match, Match) else read_match(match))
+    return MatchColumns.of_store(store, _id(match))
+
+
+def _id(match: Match | Path | str) -> str:
     if isinstance(match, Match):
         raise UsageError("expected the id of a match of the store, got a match; leave out the store")
-    return MatchColumns.of_store(store, str(match))
+    return str(match)

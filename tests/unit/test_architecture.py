@@ -17,7 +17,7 @@ PACKAGE = "teamclone"
 SOURCE = Path(__file__).resolve().parents[2] / "src" / PACKAGE
 
 BASE = ("errors", "system", "rcss")
-READING = (*BASE, "logs", "world", "store")
+READING = (*BASE, "logs", "world", "events", "store")
 CLONING = ("dataset", "play", "models", "training", "export", "search", "evaluation")
 MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "errors": (),
@@ -28,7 +28,8 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "dynamics": ("errors", "rcss", "logs.columns", "logs.match", "logs.align"),
     "protocol": (*BASE, "logs"),
     "world": ("rcss", "dynamics", "logs.columns", "logs.match", "logs.align"),
-    "store": (*BASE, "logs", "dynamics"),
+    "events": (*BASE, "logs", "dynamics"),
+    "store": (*BASE, "logs", "dynamics", "events"),
     "dataset": (*READING, "dynamics"),
     "play": (*BASE, "logs", "protocol", "store"),
     "planner": ("system", "rcss", "dynamics", "world.channels"),
@@ -40,7 +41,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "store", "dataset", "engine", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
-    "replay": (*BASE, "plots", "logs", "dynamics", "store", "training", "evaluation", "rollouts"),
+    "replay": (*BASE, "plots", "logs", "dynamics", "events", "store", "training", "evaluation", "rollouts"),
     "live": (*BASE, "protocol", "logs", "world", "engine", "training"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "engine", "models", "training", "search", "evaluation", "pipeline"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 from teamclone.dynamics.inverse.columns import recovered_commands
 from teamclone.errors import StoreError, UsageError, choose
@@ -65,9 +66,7 @@ class MatchColumns:
         Raises:
             StoreError: the store has no such match, or its rows cannot be read.
         """
-        row = next((row for row in store.matches().to_pylist() if row["match_id"] == match_id), None)
-        if row is None:
-            raise StoreError(f"{masked(store.location)}: no match {match_id}; see `teamclone matches`")
+        row = cls.row_of(store, match_id)
         tables = {name: store.read_match_columns(match_id, name) for name in ("frames", "player_states", "commands")}
         return cls(
             match_id=match_id,
@@ -80,6 +79,16 @@ class MatchColumns:
             types=store.read_match_columns(match_id, "player_types", columns=FIELDS),
             params=store.read_parameters(match_id)["server"],
         )
+
+    @staticmethod
+    def row_of(store: Store, match_id: str) -> dict[str, Any]:
+        """Return the row of a match in the table ``matches``. Raises as `of_store`."""
+        row: dict[str, Any] | None = next(
+            (row for row in store.matches().to_pylist() if row["match_id"] == match_id), None
+        )
+        if row is None:
+            raise StoreError(f"{masked(store.location)}: no match {match_id}; see `teamclone matches`")
+        return row
 
     def side_of(self, team: str | None, side: str | None) -> int:
         """Return the side that ``team`` or ``side`` names, 1 left or -1 right.

@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet
 
 from teamclone.errors import TeamcloneError, UsageError
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.prediction_table import PredictionTable, predict_match
 from teamclone.logs import read_match
+from teamclone.system.tables import check_suffix, writing
 
 if TYPE_CHECKING:
     from teamclone.models.clone import Clone
-
-SUFFIXES = (".parquet", ".csv", ".jsonl")
-"""Endings of a file of predictions; each is a format."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +56,7 @@ def predict_logs(
     Args:
         model: the clone.
         logs: game logs; command logs are found beside them.
-        out: the file; its name ends in one of SUFFIXES.
+        out: the file; its name ends in one of ``tables.SUFFIXES``.
         team: name of the team. side: "left" or "right", in its place.
         goalkeepers: predict goalkeepers of a model without catch, too.
         on_progress: called with the log, the rows done and the rows of this match.
@@ -74,8 +67,7 @@ def predict_logs(
     Raises:
         UsageError: the ending of ``out`` is unknown, or neither or both of team and side are named.
     """
-    if out.suffix not in SUFFIXES:
-        raise UsageError(f"{out}: expected a name that ends in {', '.join(SUFFIXES)}, got {out.suffix or 'no ending'}")
+    check_suffix(out)
     if (team is None) == (side is None):
         raise UsageError("name either a team or a side")
 
@@ -113,63 +105,3 @@ def _summary(path: Path, match_id: str, table: PredictionTable) -> PredictedMatc
         known=len(losses),
         log_loss=float(np.mean(losses, dtype=np.float64)) if len(losses) else None,
     )
-
-
-class _Writer(Protocol):
-    def write_table(self, table: pa.Table) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class _JsonLines:
-    """One JSON object a row and line."""
-
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("w", encoding="utf-8")
-
-    def write_table(self, table: pa.Table) -> None:
-        for batch in table.to_batches(max_chunksize=4096):
-            self._file.writelines(f"{json.dumps(row, ensure_ascii=False)}\n" for row in batch.to_pylist())
-
-    def close(self) -> None:
-        self._file.close()
-
-
-@contextmanager
-def writing(out: Path) -> Iterator[Callable[[pa.Table], None]]:
-    """Return a function that appends a table to a file, which gets its name when all of it is there."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    temporary = out.with_name(f".{out.name}.part")
-    temporary.unlink(missing_ok=True)  # it may be a link to anywhere
-    writer: _Writer | None = None
-
-    def write(table: pa.Table) -> None:
-        nonlocal writer
-        plain = table.cast(_plain(table.schema))
-        if writer is None:
-            writer = _writer(temporary, out.suffix, plain.schema)
-        writer.write_table(plain)
-
-    try:
-        try:
-            yield write
-        finally:
-            if writer is not None:
-                writer.close()
-        if writer is not None:
-            temporary.replace(out)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _plain(schema: pa.Schema) -> pa.Schema:
-    """Return a schema with words as words: a dictionary of words differs from match to match."""
-    return pa.schema(
-        [field.with_type(pa.string()) if pa.types.is_dictionary(field.type) else field for field in schema]
-    )
-
-
-def _writer(path: Path, suffix: str, schema: pa.Schema) -> Any:
-    if suffix == ".parquet":
-        return pyarrow.parquet.ParquetWriter(path, schema, compression="zstd")
-    return pyarrow.csv.CSVWriter(path, schema) if suffix == ".csv" else _JsonLines(path)

@@ -22,6 +22,8 @@ import numpy as np
 from teamclone import __version__
 from teamclone.errors import UsageError
 from teamclone.evaluation.match_columns import MatchColumns
+from teamclone.events.definitions import EventKind
+from teamclone.events.find import find_events
 from teamclone.logs import Match, read_match
 from teamclone.logs.align import slot_of
 from teamclone.logs.columns import Source
@@ -31,7 +33,7 @@ from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.replay.channels import of_commands, of_match
-from teamclone.replay.events import Event, EventKind, find_events
+from teamclone.replay.events import NOT_LISTED, Event, listed
 from teamclone.replay.fans import STEP_M, read_fans
 from teamclone.replay.jasmin import write_jasmin
 from teamclone.replay.payload import packed
@@ -129,7 +131,7 @@ def make_replay(
 
         expected = predicted(open_run(Path(run)), columns, teams=teams, checkpoint=checkpoint, on_progress=on_progress)
     fans = [] if rollouts is None else read_fans(Path(rollouts), columns)
-    events = find_events(columns.frames, columns.players, columns.params)
+    events = listed(find_events(columns.frames, columns.players, columns.params), columns.frames)
     path = Path(out)
     beside_report = run is not None and path.parent.resolve() == Path(run).resolve()
     page, notes = _page(columns, expected, fans=fans, events=events, says=says, report=beside_report)
@@ -232,7 +234,7 @@ def _head(
             for name in ("stamina_max", "effort_dec_thr", "ball_size", "ball_decay", "recover_dec_thr")
         },
         "types": {name: [_finite(value) for value in match.types[name]] for name in FIELDS},
-        "kinds": [kind.value for kind in EventKind],
+        "kinds": [kind.value for kind in EventKind if kind not in NOT_LISTED],
         "events": [list(asdict(event).values()) for event in events],
         "predictions": expected.about if expected.of else None,
         "fans": {"step": STEP_M, "of": fans},

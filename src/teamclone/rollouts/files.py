@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from teamclone import __version__
 from teamclone.dynamics.bodies import BALL
 from teamclone.errors import RunError
-from teamclone.evaluation.prediction_file import writing
 from teamclone.plots.fans import draw_fans
 from teamclone.plots.style import LIGHT, style
 from teamclone.rcss.players import N_TEAM
@@ -24,6 +23,7 @@ from teamclone.rollouts.realism import realism
 from teamclone.rollouts.run import MatchRollouts, RolloutConfig, figures
 from teamclone.system.documents import read_document, write_document
 from teamclone.system.files import write_atomic
+from teamclone.system.tables import writing
 
 FORMAT = 2
 """Format number of rollouts.json and fans.json."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from teamclone import __version__
 from teamclone.dynamics.inverse.columns import recovered_commands
 from teamclone.errors import UsageError
+from teamclone.events.find import find_events
 from teamclone.logs import Problem, Severity, columns
 from teamclone.logs.columns import Source
 from teamclone.logs.match import Columns, Match
@@ -65,6 +66,7 @@ def tables_of(match: Match, *, recover: bool = True) -> Tables:
         schema.PLAYER_TYPES: type_columns(match),
         schema.PARAMETERS: parameter_columns(match),
         schema.EVENTS: {**match.events, "text": list(match.event_texts)},
+        schema.MATCH_EVENTS: event_columns(match),
         schema.PROBLEMS: problem_columns((*match.problems, *problems)),
     }
     tables = {table.name: arrow_table(table, values, match_id=match.match_id) for table, values in made.items()}
@@ -146,6 +148,12 @@ def player_columns(match: Match) -> dict[str, Any]:
         "unum": np.tile(SLOT_UNUMS, n_frames),
         **{name: values.ravel() for name, values in match.players.items()},
     }
+
+
+def event_columns(match: Match) -> dict[str, Any]:
+    """Return the columns of ``match_events``: (n_events,)."""
+    found = find_events(match.frames, match.players, match.game.server_params)
+    return {"event": np.arange(len(found["kind"]), dtype=np.int32), **found}
 
 
 def type_columns(match: Match) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from teamclone.errors import StoreError, UsageError, choose
+from teamclone.events import definitions
 from teamclone.logs import columns
 from teamclone.logs.columns import Column, Source
 from teamclone.rcss import player_types
@@ -21,7 +22,7 @@ from teamclone.system import documents
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FORMAT = 2
+FORMAT = 3
 """Raised whenever a reader of the old tables would misread the new ones."""
 
 SIGNED = {"uint8": "int16", "uint16": "int32", "uint32": "int64"}
@@ -247,6 +248,21 @@ EVENTS = Table(
     order="line",
 )
 
+MATCH_EVENTS = Table(
+    name="match_events",
+    about=(
+        "One row an event of the match, found in the game log: passes, shots, tackles, set plays and so on. The page "
+        "of `teamclone events` defines the kinds and their outcomes."
+    ),
+    key=("match_id", "event"),
+    fields=(
+        MATCH_ID,
+        _field("event", "int32", "", "place among the events of its match, from 0, by frame"),
+        *_logged(definitions.COLUMNS),
+    ),
+    order="event",
+)
+
 PROBLEMS = Table(
     name="problems",
     about="One row for each thing that was odd in the files of a match.",
@@ -289,7 +305,7 @@ COMMAND_SOURCES = _names(
     tuple((int(source), source.name.lower()) for source in Source),
 )
 
-MATCH_TABLES = (MATCHES, FRAMES, PLAYER_STATES, COMMANDS, PLAYER_TYPES, PARAMETERS, EVENTS, PROBLEMS)
+MATCH_TABLES = (MATCHES, FRAMES, PLAYER_STATES, COMMANDS, PLAYER_TYPES, PARAMETERS, EVENTS, MATCH_EVENTS, PROBLEMS)
 """The tables that every match fills."""
 
 TABLES = (*MATCH_TABLES, PLAYMODES, COMMAND_KINDS, COMMAND_SOURCES)

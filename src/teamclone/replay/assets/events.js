@@ -5,7 +5,8 @@ import { peaks } from "./match.js";
 export const SURPRISE = "surprise";
 export const FUTURE = "futures";
 const MESSAGE = "message";
-const HIDDEN_AT_FIRST = new Set(["kick"]);
+/** Kinds of which there are so many that the list begins without them. */
+export const HIDDEN_AT_FIRST = new Set(["kick", "dribble", "self pass", "ball touch", "multi touch", "press"]);
 const MOST_MESSAGES = 200;
 
 /** A new element with a class and a text; texts are never markup. */

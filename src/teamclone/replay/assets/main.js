@@ -8,7 +8,7 @@ import { Camera, watchPointers } from "./camera.js";
 import { discRadius, drawBall, drawPitch, drawPlayers } from "./pitch.js";
 import { drawOver, drawUnder } from "./overlays.js";
 import { Detail, Overview, seriesOf, watchScrubbing } from "./timeline.js";
-import { EventList, FUTURE, SURPRISE, element, futures, surprises } from "./events.js";
+import { EventList, FUTURE, HIDDEN_AT_FIRST, SURPRISE, element, futures, surprises } from "./events.js";
 import { Panel } from "./panel.js";
 import { Capture } from "./capture.js";
 import { LinkWriter, readLink } from "./link.js";
@@ -125,7 +125,7 @@ class Replay {
   keyTable() {
     const { clock } = this;
     const kinds = [
-      ["s", SURPRISE, "surprise"], ["g", "goal", "goal"], ["h", "shot", "shot"], ["k", "kick", "kick"], ["t", "turnover", "turnover"],
+      ["s", SURPRISE, "surprise"], ["g", "goal", "goal"], ["h", "shot", "shot"], ["k", "kick", "kick"], ["t", "interception", "interception"],
       ["p", "set play", "set play"], ["x", "tackle", "tackle"], ["l", "foul", "foul"], ["j", FUTURE, "futures"], ["e", "any", "event in the list"],
     ].filter(([, kind]) => kind === "any" || this.events.kinds.includes(kind));
     return [
@@ -296,7 +296,7 @@ class Replay {
 
   state() {
     const { clock, match, view, events, camera } = this;
-    const first = events.kinds.filter((kind) => kind !== "kick");
+    const first = events.kinds.filter((kind) => !HIDDEN_AT_FIRST.has(kind));
     const kinds = events.kinds.filter((kind) => events.on.has(kind));
     return {
       cycle: match.cycle(clock.frame),

@@ -7,7 +7,7 @@ const LEAST_TOP = 0.25; // nats at the top of the graphs, at least
 const CUT_OFF = 0.005; // share of the cycles whose loss is beyond the top
 const RIBBON = 10; // pixels of a row of commands
 const CELL = { dash: 0.5, turn: 0.75 }; // share of the row that a command fills, so that colour is not all; others all
-const MARKED = new Set(["goal", "shot", "card", "set play", "turnover", "foul"]);
+const MARKED = new Set(["goal", "shot", "card", "set play", "interception", "foul", "offside"]);
 
 /** What the graphs show: one or two series of log loss, or the ball's x where there is no prediction. */
 export function seriesOf(match, chosen) {
@@ -111,7 +111,7 @@ export class Overview {
       context.lineTo(x, 3);
       context.lineTo(x + 3, 10);
       context.fill();
-    } else if (event.kind !== "turnover") {
+    } else if (event.kind !== "interception") {
       context.globalAlpha = 0.75;
       context.fillRect(x - 0.5, 3, 1, 6);
       context.globalAlpha = 1;
@@ -246,7 +246,7 @@ export class Detail {
   word(context, event, x, { top, bottom, free }) {
     context.fillStyle = event.side ? colours[event.side > 0 ? "left-edge" : "right-edge"] : colours.muted;
     context.fillRect(x - 0.75, top, 1.5, bottom - top);
-    if (event.kind === "turnover" || event.kind === "set play" || event.kind === "foul") return;
+    if (event.kind === "interception" || event.kind === "set play" || event.kind === "foul" || event.kind === "offside") return;
     context.font = `600 11px ${FONT}`;
     context.textAlign = "left";
     context.textBaseline = "top";

@@ -244,10 +244,10 @@ class PlainEvents:
             speed = self.moved(start, start + 1)
             away = (self.ball[start + 1][0] - self.ball[start][0]) * team >= 0
             own_third = self.ball[start][0] * team < -17.5
-            if outcome != "offside" and own_third and away and speed >= self.fast:
-                if self.moved(start, end) >= the.CLEARANCE_M:
-                    yield ("clearance", outcome, start, end, *me, *other)
-                    continue
+            far = self.moved(start, end) >= the.CLEARANCE_M
+            if outcome != "offside" and own_third and away and far and speed >= self.fast:
+                yield ("clearance", outcome, start, end, *me, *other)
+                continue
             if math.dist((self.x[end][who], self.y[end][who]), self.ball[end]) > the.CONTROL_M:
                 row = ("pass", outcome, start, end, *me, *other)
                 yield row

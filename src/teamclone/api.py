@@ -107,7 +107,7 @@ def match_events(match: Match | Path | str, *, store: Store | None = None) -> Ma
         store: where ``match`` is an id.
 
     Raises:
-        LogError: the log cannot be read.
+        LogError: the log cannot be read, or has no frame.
         StoreError: the store has no such match.
     """
     if store is None:

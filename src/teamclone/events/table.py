@@ -39,7 +39,14 @@ class MatchEvents:
 
     @classmethod
     def of(cls, match: Match) -> MatchEvents:
-        """Find the events of a match."""
+        """Find the events of a match.
+
+        Raises:
+            LogError: there is no game log, or it has no frame.
+        """
+        if not len(match.frames["cycle"]):
+            text = "expected frames to find events in, the log has none; name its game log (.rcg)"
+            raise LogError(text, path=match.rcg_path or match.rcl_path)
         return cls(
             match_id=match.match_id,
             left=match.left.name,
@@ -144,7 +151,7 @@ def events_of_logs(
             if on_progress is not None:
                 on_progress(done, len(pairs))
             try:
-                found = MatchEvents.of(_with_frames(pair))
+                found = MatchEvents.of(read_pair(pair))
             except (LogError, OSError) as error:
                 results.append(FoundEvents(path=pair.path, error=str(error)))
                 continue
@@ -155,13 +162,6 @@ def events_of_logs(
     if on_progress is not None:
         on_progress(len(pairs), len(pairs))
     return results
-
-
-def _with_frames(pair: LogPair) -> Match:
-    match = read_pair(pair)
-    if not len(match.frames["cycle"]):
-        raise LogError("expected frames to find events in, the log has none; name its game log (.rcg)", path=pair.path)
-    return match
 
 
 def _check_teams(teams: Collection[str], results: Sequence[FoundEvents]) -> None:

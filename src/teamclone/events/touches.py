@@ -80,7 +80,8 @@ class Moments:
     @property
     def single(self) -> Bools:
         """(n_moments,) one player alone kicks or tackles, with the ball in play: what most events begin with."""
-        return (self.slot != NOBODY) & self.counts
+        found: Bools = (self.slot != NOBODY) & self.counts
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from typer.models import ArgumentInfo
 
 import teamclone
 from teamclone.cli.app import app
+from teamclone.events import definitions, statistics
 from teamclone.models.config import FAMILIES
 from teamclone.store import schema
 from teamclone.system.settings import described
@@ -39,6 +40,13 @@ def pages() -> dict[Path, str]:
         FileNotFoundError: a command has no page under `docs/reference/commands/`.
     """
     made = {_command_page(name): _filled(_command_page(name), options=_options(name)) for name in COMMANDS}
+    made[_command_page("events")] = _filled(
+        _command_page("events"),
+        options=_options("events"),
+        kinds=_kinds(),
+        columns=_columns(),
+        statistics=_statistics(),
+    )
     made[REFERENCE / "settings.md"] = _filled(REFERENCE / "settings.md", settings=_settings())
     made[REFERENCE / "api.md"] = _filled(REFERENCE / "api.md", api=_api())
     made[REFERENCE / "data-model.md"] = schema.markdown()
@@ -132,6 +140,29 @@ def _default(parameter: inspect.Parameter, hint: Any) -> str:
     if hint is bool:
         return "on" if parameter.default else "off"
     return "" if parameter.default in (None, ()) else f"`{getattr(parameter.default, 'value', parameter.default)}`"
+
+
+# Events
+
+
+def _kinds() -> str:
+    """Every kind of event: its outcomes, whose definition it is, and that."""
+    rows = [
+        (kind.value, ", ".join(f"`{one}`" for one in definitions.OUTCOMES.get(kind, ())), whose, about)
+        for kind, (whose, about) in definitions.KINDS.items()
+    ]
+    return _table(("kind", "outcomes", "definition of", "definition"), rows)
+
+
+def _columns() -> str:
+    """The columns of the table of events."""
+    rows = [(f"`{one.name}`", one.unit, one.about) for one in definitions.COLUMNS]
+    return _table(("column", "unit", "meaning"), rows)
+
+
+def _statistics() -> str:
+    """Every statistic of a team."""
+    return _table(("statistic", "unit", "meaning"), [(f"`{name}`", *rest) for name, *rest in statistics.described()])
 
 
 # Settings

@@ -300,7 +300,7 @@ def test_keys_jump_to_what_happened(page: Page, predicted: Path) -> None:
     head = unpack_page(predicted.read_text()).head
     columns = unpack_page(predicted.read_text()).columns
     opened(page, predicted, "#c=1")
-    for key, kind in (("g", "goal"), ("h", "shot"), ("k", "kick"), ("t", "turnover"), ("p", "set play")):
+    for key, kind in (("g", "goal"), ("h", "shot"), ("k", "kick"), ("t", "interception"), ("p", "set play")):
         page.press("Home")
         frames = [event[0] for event in head["events"] if event[1] == kind and event[0] > 0]
         page.press(key)

@@ -2,7 +2,7 @@
 
     python benchmarks/events.py MATCH... [--rcg2data FOLDER]
 
-FOLDER has the files that rcg2data (github.com/hidehisaakiyama/rcg2data) wrote of the same matches, NAME.event.csv of NAME.rcg.
+FOLDER has the files that rcg2data (github.com/hidehisaakiyama/rcg2data) wrote of the same matches: NAME.event.csv.
 Without it the table has our side alone.
 """
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 from made_match import Row
@@ -48,11 +49,12 @@ def unum(slot: int) -> int:
 class PlainEvents:
     """One match."""
 
-    def __init__(self, match: Match) -> None:
+    def __init__(self, match: Match | SimpleNamespace) -> None:
         frames, players, params = match.frames, match.players, match.game.server_params
         self.n = len(frames["cycle"])
         self.mode = [
-            PlayMode(mode).name.lower() if mode < len(PlayMode) else "?" for mode in frames["playmode"].tolist()
+            PlayMode(mode).name.lower() if mode < len(PlayMode) else f"unknown {mode}"
+            for mode in frames["playmode"].tolist()
         ]
         self.ball = list(zip(frames["ball_x"].tolist(), frames["ball_y"].tolist(), strict=True))
         self.state, self.dashes = players["state"].tolist(), players["count_dash"].tolist()
@@ -394,12 +396,12 @@ class PlainEvents:
                     start = None
 
     def set_plays(self) -> Iterator[Row]:
-        others = ("play_on", "null", "before_kick_off", "time_over", "first_half_over", "pause", "human_judge", "?")
+        others = ("play_on", "null", "before_kick_off", "time_over", "first_half_over", "pause", "human_judge")
         for frame in range(self.n):
             what = self.what(frame)
             if frame and self.mode[frame] == self.mode[frame - 1]:
                 continue
-            if what in others or what == "goal" or self.is_fault(frame):
+            if what in others or what.startswith("unknown") or what == "goal" or self.is_fault(frame):
                 continue
             end = next((at for at in range(frame, self.n) if self.mode[at] != self.mode[frame]), self.n - 1)
             team = self.team(frame)

@@ -193,11 +193,14 @@ def duels(play: Play) -> Iterator[Found]:
     kicks = found.kind == TouchKind.KICK
     yield Found.of(EventKind.KICK, found.frame[kicks], slot=found.slot[kicks], touched=True)
 
-    caught = np.flatnonzero(these.catcher != NOBODY)
-    before = np.maximum(caught - 1, 0)
-    fresh = (caught > 0) & ~these.stopped[before]
-    other = np.where(fresh, these.slot[before], NOBODY)
-    yield Found.of(EventKind.CATCH, these.frame[caught], slot=these.catcher[caught], other=other)
+    catches = found.kind == TouchKind.CATCH
+    frame = found.frame[catches]
+    before = np.searchsorted(these.frame, frame) - 1
+    fresh = before >= 0
+    fresh[fresh] = ~these.stopped[before[fresh]]
+    other = np.full(len(frame), NOBODY)
+    other[fresh] = these.slot[before[fresh]]
+    yield Found.of(EventKind.CATCH, frame, slot=found.slot[catches], other=other)
 
     tackles = found.kind == TouchKind.TACKLE
     slot, frame = found.slot[tackles], found.frame[tackles]

@@ -42,7 +42,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
     "replay": (*BASE, "plots", "logs", "dynamics", "events", "store", "training", "evaluation", "rollouts"),
-    "live": (*BASE, "protocol", "logs", "world", "engine", "training"),
+    "live": (*BASE, "protocol", "logs", "dynamics", "world", "dataset", "engine", "models", "training", "evaluation"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "engine", "models", "training", "search", "evaluation", "pipeline"),
     "cli": (*READING, *CLONING, "rollouts", "report", "replay", "protocol", "live", "pipeline", "api"),

@@ -52,6 +52,11 @@ def print_json(value: Any) -> None:
     print(json_text(_finite(value), indent=2))
 
 
+def json_line(value: Any) -> str:
+    """Return a JSON document on one line; NaN becomes null."""
+    return json_text(_finite(value))
+
+
 def _finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None

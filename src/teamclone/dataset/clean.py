@@ -312,6 +312,20 @@ def _nothing(frames: Columns, players: Columns) -> NDArray[np.bool_]:
     return nothing
 
 
+def as_stored(players: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return ``World.players`` as a dataset's reader gives them: measured channels in whole `layout.STEP`.
+
+    A model was fitted to such numbers, and is evaluated on them.
+    """
+    made = players.copy()
+    stored = _stored(players[..., _MEASURED], np.array(list(layout.STEP.values())))
+    measured = stored.astype(np.float32) * layout.STEPS
+    made[..., _MEASURED] = np.where(stored == layout.MISSING, np.float32(np.nan), measured)
+    codes = _code(players[..., _CATEGORICAL])
+    made[..., _CATEGORICAL] = np.where(codes == layout.NO_CODE, np.float32(np.nan), codes)
+    return made
+
+
 def _frames(world: World, playmode: NDArray[np.uint8]) -> Columns:
     """Return layout.FRAME_ARRAYS (without ``match``) of frames as a team sees them."""
     measured, categorical = world.players[..., _MEASURED], world.players[..., _CATEGORICAL]

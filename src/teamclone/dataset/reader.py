@@ -28,7 +28,7 @@ from teamclone.dataset.layout import (
     index_stops,
 )
 from teamclone.errors import DatasetError
-from teamclone.rcss.commands import CLONED, CommandKind, not_of_repertoire
+from teamclone.rcss.commands import CLONED, kind_places, not_of_repertoire
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import OTHER_SIDE
@@ -222,10 +222,7 @@ class Dataset:
         frame = self.samples["frame"].index_select(0, rows)
         actor = self.samples["player"].index_select(0, rows)
         kind = self.frames["categorical"][frame.long(), actor.long(), CATEGORICAL_INDEX["last_command"]].long()
-        place = torch.full((NO_CODE + 1,), -1, dtype=torch.int64)
-        for index, name in enumerate(self.commands):
-            place[0 if name == "none" else CommandKind[name.upper()]] = index
-        return place[kind]
+        return torch.from_numpy(kind_places(self.commands))[kind]
 
     def mode(self, rows: Rows) -> Tensor:
         """Return (batch,) int64 the play mode of each sample, as the modelled team sees it."""

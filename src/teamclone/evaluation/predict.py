@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from teamclone.dataset.reader import Dataset
 from teamclone.evaluation.answers import BATCH, answers
-from teamclone.evaluation.predictions import Predictions
+from teamclone.evaluation.predictions import Predictions, issued_parameters
 from teamclone.rcss.commands import parameters_of
 from teamclone.world.state import State
 
@@ -79,10 +79,5 @@ def truth(
     """Return kind (n,), issued (n, parameters) and last (n,), see `Predictions`, of samples ``rows`` (n,)."""
     target = dataset.target(rows)
     kind, arguments, known = target.kind.numpy(), target.parameters.numpy(), target.known.numpy()
-    items = parameters_of(dataset.commands)
-    issued = np.full((len(rows), len(items)), np.nan, np.float32)
-    for column, parameter in enumerate(items):
-        carries = kind == dataset.commands.index(parameter.kind.name.lower())
-        carries &= known[:, parameter.argument]
-        issued[carries, column] = arguments[carries, parameter.argument]
+    issued = issued_parameters(kind, arguments, known, dataset.commands)
     return kind, issued, dataset.last_kind(rows).numpy()

@@ -17,6 +17,7 @@ from teamclone.dynamics import formulas
 from teamclone.errors import DatasetError, TeamcloneError
 from teamclone.evaluation.answers import Answers, answers
 from teamclone.evaluation.match_columns import MatchColumns
+from teamclone.evaluation.predictions import issued_parameters
 from teamclone.logs.columns import INTERVALS, Source
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
@@ -260,11 +261,7 @@ def _done(
     arguments, interval = np.zeros((len(frame), 2), np.float32), np.zeros((len(frame), 2, 2), np.float32)
     kind[row], executed[row] = samples["kind"][here], samples["executed"][here]
     arguments[row], interval[row] = samples["parameters"][here], samples["interval"][here]
-    known = np.isfinite(interval)
-    issued = np.full((len(frame), len(parameters_of(commands))), np.nan, np.float32)
-    for column, of in enumerate(parameters_of(commands)):
-        carries = (kind == commands.index(of.kind.name.lower())) & known[:, of.argument].all(axis=1)
-        issued[carries, column] = arguments[carries, of.argument]
+    issued = issued_parameters(kind, arguments, np.isfinite(interval).all(axis=2), commands)
     with_ball = np.isin(kind, [commands.index(name) for name in ("kick", "tackle")])
     return _Done(
         kind=kind, arguments=arguments, interval=interval, executed=executed, issued=issued, with_ball=with_ball

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.rcss.commands import CLONED
+from teamclone.rcss.commands import CLONED, parameters_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,3 +49,20 @@ class Predictions:
         columns = {field.name: getattr(self, field.name) for field in fields(self)}
         some: dict[str, Any] = {name: of[index] for name, of in columns.items() if isinstance(of, np.ndarray)}
         return replace(self, **some)
+
+
+def issued_parameters(
+    kind: NDArray[np.integer], arguments: NDArray[np.float32], known: NDArray[np.bool_], commands: tuple[str, ...]
+) -> NDArray[np.float32]:
+    """Return (n, parameters) `Predictions.issued`.
+
+    Args:
+        kind: (n,) indices into ``commands``, -1 for none of them. arguments, known: (n, 2) of each command, and
+            whether anything is known of them.
+    """
+    items = parameters_of(commands)
+    issued = np.full((len(kind), len(items)), np.nan, np.float32)
+    for column, parameter in enumerate(items):
+        carries = (kind == commands.index(parameter.kind.name.lower())) & known[:, parameter.argument]
+        issued[carries, column] = arguments[carries, parameter.argument]
+    return issued

@@ -22,8 +22,11 @@ from teamclone.rcss.playmodes import PlayMode
 MAX_BYTES = 16_384
 """Most bytes of a datagram that is read; a record has about 3,400."""
 
-_HEAD = re.compile(rb"\(show \d{1,10} \(pm (\d{1,3})\) \(tm ([^\s()]{1,64}) ([^\s()]{1,64}) (\d{1,5}) (\d{1,5})[ )]")
-"""Play mode, names and scores, which logs have in records of their own and monitors get in each."""
+_HEAD = re.compile(
+    rb"\(show \d{1,10} \(pm (\d{1,3})\) "
+    rb"\(tm ([^\s()]{1,64}) ([^\s()]{1,64}) (\d{1,5}) (\d{1,5})(?:(?: \d{1,5}){4})?\) ?"
+)
+"""Play mode, names, scores and penalties, which logs have in records of their own and monitors get in each."""
 _PLACE_SCALE = 16
 """Positions in requests are whole sixteenths of a metre."""
 

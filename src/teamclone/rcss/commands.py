@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from teamclone.rcss import pitch
 
 
@@ -81,6 +84,14 @@ def not_of_repertoire(commands: tuple[str, ...]) -> str | None:
     if commands == (*CLONED, *(name for name in further if name in commands)):
         return None
     return f"{', '.join(CLONED)} and then, in this order, some of {', '.join(further)}; got {', '.join(commands)}"
+
+
+def kind_places(commands: tuple[str, ...]) -> NDArray[np.int64]:
+    """Return (256,) the place of each CommandKind among some of REPERTOIRE, that of ``none`` for 0; -1 for others."""
+    place = np.full(256, -1, np.int64)
+    for index, name in enumerate(commands):
+        place[0 if name == "none" else CommandKind[name.upper()]] = index
+    return place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

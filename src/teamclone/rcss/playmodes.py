@@ -129,12 +129,15 @@ def _restarts(mode: PlayMode) -> int:
     return -side if _situation(mode) in (Situation.GOAL, Situation.FAULT) else side
 
 
+_STOPPED = (PlayMode.NULL, PlayMode.TIME_OVER, PlayMode.FIRST_HALF_OVER, PlayMode.PAUSE, PlayMode.HUMAN_JUDGE)
 _WITHOUT_KICKS = (Situation.BEFORE_KICK_OFF, Situation.GOAL, Situation.FAULT)
 
 BALL_KICKED = np.zeros(256, np.bool_)
 """(256,) whether a kick moves the ball in a play mode (`player.cpp`, kick)."""
 BALL_TACKLED = np.zeros(256, np.bool_)
 """(256,) whether a tackle does: as kicks, but for catch_fault, which the server's list of tackles leaves out."""
+CLOCK_STANDS = np.zeros(256, np.bool_)
+"""(256,) whether the server shows one cycle again and again in a play mode."""
 SITUATION = np.zeros(256, np.uint8)
 """(256,) the Situation of each play mode by its id."""
 RESTARTS = np.zeros(256, np.int8)
@@ -147,6 +150,7 @@ OTHER_SIDE = np.arange(256, dtype=np.uint8)
 for _mode in PlayMode:
     BALL_KICKED[_mode] = _situation(_mode) not in _WITHOUT_KICKS and _mode is not PlayMode.TIME_OVER
     BALL_TACKLED[_mode] = BALL_KICKED[_mode] or _mode in (PlayMode.CATCH_FAULT_L, PlayMode.CATCH_FAULT_R)
+    CLOCK_STANDS[_mode] = _situation(_mode) in _WITHOUT_KICKS or _mode in _STOPPED
     SITUATION[_mode], RESTARTS[_mode] = _situation(_mode), _restarts(_mode)
     if RESTARTS[_mode]:
         OTHER_SIDE[_mode] = PlayMode[f"{_mode.name[:-1]}{'R' if _mode.name.endswith('_L') else 'L'}"]

@@ -101,7 +101,7 @@ def view_columns(
         cycle=frames["cycle"],
         stoppage=frames["stoppage"],
         mode=OTHER_SIDE[mode] if turned else mode,
-        mode_cycles=_since(frames),
+        mode_cycles=mode_cycles(frames),
         score=np.stack([frames[own], frames[other]], axis=-1),
         ball=ball.astype(np.float32) + np.float32(0),
         players=made,
@@ -111,8 +111,12 @@ def view_columns(
     )
 
 
-def _since(frames: Columns) -> NDArray[np.int32]:
-    """Return (n_frames,) frames since the play mode began, 0 in its first, and in the first after lost frames."""
+def mode_cycles(frames: Columns) -> NDArray[np.int32]:
+    """Return (n_frames,) frames since the play mode began, 0 in its first, and in the first after lost frames.
+
+    Args:
+        frames: ``cycle``, ``stoppage`` and ``playmode``, (n_frames,) each.
+    """
     mode: NDArray[Any] = frames["playmode"]
     began = np.ones(len(mode), np.bool_)
     began[1:] = (mode[1:] != mode[:-1]) | ~follows(frames)[:-1]

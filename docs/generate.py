@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
+import typer
 from typer.models import ArgumentInfo
 
 import teamclone
@@ -26,11 +27,22 @@ from teamclone.training import config as training_config
 
 DOCS = Path(__file__).resolve().parent
 REFERENCE = DOCS / "reference"
-COMMANDS: dict[str, Callable[..., Any]] = {
-    one.name or one.callback.__name__: one.callback
-    for one in app.registered_commands
-    if one.callback is not None and not one.hidden
-}
+
+
+def _commands(of: typer.Typer, before: str = "") -> dict[str, Callable[..., Any]]:
+    """The functions of all commands by their words: `live watch`."""
+    made = {
+        f"{before}{one.name or one.callback.__name__}": one.callback
+        for one in of.registered_commands
+        if one.callback is not None and not one.hidden
+    }
+    for group in of.registered_groups:
+        if group.typer_instance is not None:
+            made |= _commands(group.typer_instance, f"{before}{group.name} ")
+    return made
+
+
+COMMANDS = _commands(app)
 
 
 def pages() -> dict[Path, str]:
@@ -54,7 +66,7 @@ def pages() -> dict[Path, str]:
 
 
 def _command_page(name: str) -> Path:
-    return REFERENCE / "commands" / f"{name}.md"
+    return REFERENCE / "commands" / f"{name.replace(' ', '-')}.md"
 
 
 def _filled(page: Path, **blocks: str) -> str:

@@ -18,16 +18,25 @@ from teamclone.training.config import setting_names
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-COMMANDS = {
-    name: command
-    for name, command in typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
-    if not command.hidden
-}
+
+
+def _commands(group: Any, before: str = "") -> dict[str, Any]:
+    """Every command by its words: `live watch`."""
+    found: dict[str, Any] = {}
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            found |= _commands(command, f"{before}{name} ")
+        elif not command.hidden:
+            found[f"{before}{name}"] = command
+    return found
+
+
+COMMANDS = _commands(typer.main.get_command(app))
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_a_command_has_a_page_that_names_every_option(name: str) -> None:
-    page = (DOCS / "reference" / "commands" / f"{name}.md").read_text()
+    page = (DOCS / "reference" / "commands" / f"{name.replace(' ', '-')}.md").read_text()
     command: Any = COMMANDS[name]
     options = [
         option
@@ -40,7 +49,9 @@ def test_a_command_has_a_page_that_names_every_option(name: str) -> None:
 
 
 def test_every_command_page_is_of_a_command() -> None:
-    assert {page.stem for page in (DOCS / "reference" / "commands").glob("*.md")} == set(COMMANDS)
+    assert {page.stem for page in (DOCS / "reference" / "commands").glob("*.md")} == {
+        name.replace(" ", "-") for name in COMMANDS
+    }
 
 
 def test_the_menu_lists_every_page_once() -> None:
@@ -85,7 +96,7 @@ def test_the_commands_of_the_readme_are_those_of_the_demo() -> None:
     demo = (ROOT / "Makefile").read_text().partition("\ndemo: ")[2].partition("\n\n")[0]
     run = {f"teamclone {verb}" for verb in re.findall(r"/teamclone (\w+)", demo)}
     assert run <= typed
-    assert {line.split()[1] for line in typed} <= set(COMMANDS)
+    assert {_parted(line.split()[1:])[0] for line in typed} <= set(COMMANDS)
 
 
 def typed() -> list[tuple[str, list[str]]]:
@@ -96,8 +107,14 @@ def typed() -> list[tuple[str, list[str]]]:
             lines = re.sub(r"\\\n", " ", block)
             # A quoted argument may go over several lines.
             commands = re.findall(r"^(?:\$ )?teamclone ((?:[^\n\"']|\"[^\"]*\"|'[^']*')*)", lines, re.MULTILINE)
-            found += [(page.name, shlex.split(command, comments=True)) for command in commands]
+            found += [(page.name, _parted(shlex.split(command, comments=True))) for command in commands]
     return found
+
+
+def _parted(words: list[str]) -> list[str]:
+    """The words of a command line, those that name the command as one."""
+    name = " ".join(words[:2])
+    return [name, *words[2:]] if name in COMMANDS else words
 
 
 def test_commands_in_the_pages_have_these_options() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teamclone.logs.assemble import MAX_SCORE
 from teamclone.logs.columns import FRAMES, PLAYERS
@@ -91,7 +90,8 @@ class Seen:
     def _write(self, frame: Frame) -> None:
         index, show = self.counts.frames, frame.show
         if index == len(self._frames["cycle"]):
-            self._frames, self._players = _doubled(self._frames), _doubled(self._players)
+            self._frames = _joined(self._frames, empty_columns(FRAMES, index))
+            self._players = _joined(self._players, empty_columns(PLAYERS, index, N_PLAYERS))
         same = index > 0 and self._frames["cycle"][index - 1] == show.cycle
         values = {
             "cycle": show.cycle,
@@ -113,10 +113,5 @@ def known_mode(show: Show) -> PlayMode:
     return PlayMode(show.playmode) if show.playmode < len(PlayMode) else PlayMode.NULL
 
 
-def _doubled(columns: Columns) -> Columns:
-    """Return columns with as much room again."""
-
-    def doubled(column: NDArray[np.generic]) -> NDArray[np.generic]:
-        return np.concatenate([column, np.empty_like(column)])
-
-    return {name: doubled(column) for name, column in columns.items()}
+def _joined(columns: Columns, more: Columns) -> Columns:
+    return {name: np.concatenate([column, more[name]]) for name, column in columns.items()}

@@ -36,7 +36,7 @@ def train(
     out: Annotated[Path, typer.Option("--out", help="Run folder to make, or to go on with.")],
     preset: Annotated[
         str | None,
-        typer.Option(help="Settings to start from: best, paper or small; default best.", show_default=False),
+        typer.Option(help="Settings to start from: best, play, paper or small; default best.", show_default=False),
     ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change one setting: train.epochs=50.")

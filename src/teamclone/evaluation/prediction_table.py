@@ -261,7 +261,8 @@ def _done(
     arguments, interval = np.zeros((len(frame), 2), np.float32), np.zeros((len(frame), 2, 2), np.float32)
     kind[row], executed[row] = samples["kind"][here], samples["executed"][here]
     arguments[row], interval[row] = samples["parameters"][here], samples["interval"][here]
-    issued = issued_parameters(kind, arguments, np.isfinite(interval).all(axis=2), commands)
+    known: NDArray[np.bool_] = np.isfinite(interval).all(axis=2)
+    issued = issued_parameters(kind, arguments, known, commands)
     with_ball = np.isin(kind, [commands.index(name) for name in ("kick", "tackle")])
     return _Done(
         kind=kind, arguments=arguments, interval=interval, executed=executed, issued=issued, with_ball=with_ball

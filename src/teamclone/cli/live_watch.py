@@ -40,7 +40,6 @@ def watch(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, stop)  # ends the watch as Ctrl-C does: with its score, and with the log
     config = WatchConfig(
         host=host,
         port=port,
@@ -51,8 +50,12 @@ def watch(
         silence_s=silence,
         score_every=10 if sys.stdout.isatty() and not as_json else 100,
     )
-    with _Screen(as_json=as_json) as screen:
-        end = watch_match(open_run(run), config, checkpoint=checkpoint, on_event=screen.show)
+    before = signal.signal(signal.SIGTERM, stop)  # ends the watch as Ctrl-C does: with its score, and with the log
+    try:
+        with _Screen(as_json=as_json) as screen:
+            end = watch_match(open_run(run), config, checkpoint=checkpoint, on_event=screen.show)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     if not as_json:
         _print_end(end)
 

@@ -258,11 +258,10 @@ def _done(
     here = row >= 0
     row = row[here]
     kind, executed = np.full(len(frame), -1, np.int64), np.zeros(len(frame), np.bool_)
-    arguments: NDArray[np.float32] = np.zeros((len(frame), 2), np.float32)
-    interval: NDArray[np.float32] = np.zeros((len(frame), 2, 2), np.float32)
+    arguments, interval = np.zeros((len(frame), 2), np.float32), np.zeros((len(frame), 2, 2), np.float32)
     kind[row], executed[row] = samples["kind"][here], samples["executed"][here]
     arguments[row], interval[row] = samples["parameters"][here], samples["interval"][here]
-    issued = issued_parameters(kind, arguments, np.all(np.isfinite(interval), axis=2), commands)
+    issued = issued_parameters(kind, arguments, np.asarray(np.isfinite(interval).all(axis=2)), commands)
     with_ball = np.isin(kind, [commands.index(name) for name in ("kick", "tackle")])
     return _Done(
         kind=kind, arguments=arguments, interval=interval, executed=executed, issued=issued, with_ball=with_ball

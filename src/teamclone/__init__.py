@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from teamclone.api import LoadedClone, load, match_events
+    from teamclone.comparison.compare import Comparison, compare, write_comparison
     from teamclone.dataset.build import DatasetConfig, build_dataset
     from teamclone.dataset.reader import Dataset, open_dataset
     from teamclone.dynamics.bodies import Bodies, Commands
@@ -67,6 +68,9 @@ _HOME = {
     "evaluate": "evaluation.evaluate",
     "make_report": "report.page",
     "make_replay": "replay.page",
+    "compare": "comparison.compare",
+    "Comparison": "comparison.compare",
+    "write_comparison": "comparison.compare",
     "TeamcloneError": "errors",
 }
 """The module of each public name, in the order of the pipeline."""
@@ -74,6 +78,7 @@ _HOME = {
 __all__ = [
     "Bodies",
     "Commands",
+    "Comparison",
     "Dataset",
     "DatasetConfig",
     "LoadedClone",
@@ -87,6 +92,7 @@ __all__ = [
     "TeamcloneError",
     "World",
     "build_dataset",
+    "compare",
     "create_store",
     "evaluate",
     "find_matches",
@@ -104,6 +110,7 @@ __all__ = [
     "team_statistics",
     "train",
     "view",
+    "write_comparison",
 ]
 
 

@@ -41,12 +41,13 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "store", "dataset", "engine", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
+    "comparison": (*READING, "plots", "play.holes", "evaluation.bootstrap"),
     "replay": (*BASE, "plots", "logs", "dynamics", "events", "store", "training", "evaluation", "rollouts"),
     "live": (*BASE, "protocol", "logs", "dynamics", "world", "dataset", "engine", "models", "training", "evaluation"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "engine", "models", "training", "search", "evaluation", "pipeline"),
-    "cli": (*READING, *CLONING, "rollouts", "report", "replay", "protocol", "live", "pipeline", "api"),
-    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "replay", "api"),
+    "cli": (*READING, *CLONING, "rollouts", "report", "comparison", "replay", "protocol", "live", "pipeline", "api"),
+    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "comparison", "replay", "api"),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""

@@ -12,6 +12,7 @@ import typer
 from teamclone.cli import (
     adapt,
     bench,
+    compare,
     dataset,
     evaluate,
     events,
@@ -76,6 +77,7 @@ for command in (
     evaluate.evaluate,
     report.report,
     bench.bench,
+    compare.compare,
     export.export,
 ):
     app.command()(command)

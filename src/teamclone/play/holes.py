@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.logs.align import body_commands, slot_of
-from teamclone.logs.match import Match
+from teamclone.logs.match import Columns, Match
 from teamclone.rcss import state_bits
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.playmodes import PlayMode
@@ -39,7 +39,17 @@ class Holes:
 
 def count_holes(match: Match) -> Holes:
     """Count holes, clashes and missed cycles of every player."""
-    commands, cycle = match.commands, match.frames["cycle"]
+    return holes_of(match.frames, match.players, match.commands)
+
+
+def holes_of(frames: Columns, players: Columns, commands: Columns) -> Holes:
+    """Count them from the columns of a match.
+
+    Args:
+        frames: ``columns.FRAMES``, (n_frames,). players: ``columns.PLAYERS``, (n_frames, 22).
+        commands: ``columns.COMMANDS``, (n_commands,), of a command log.
+    """
+    cycle = frames["cycle"]
     n_frames = len(cycle)
     slot = slot_of(commands["side"], commands["unum"])
     place = commands["frame"].astype(np.int64) * N_PLAYERS + slot
@@ -47,10 +57,10 @@ def count_holes(match: Match) -> Holes:
     def per_frame(index: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.bincount(place[index], minlength=n_frames * N_PLAYERS).reshape(n_frames, N_PLAYERS)
 
-    mode = match.frames["playmode"]
+    mode = frames["playmode"]
     body = per_frame(body_commands(commands, mode))
     heard = per_frame(np.flatnonzero((commands["frame"] >= 0) & (slot >= 0))) > 0
-    state = match.players["state"]
+    state = players["state"]
     free = ((state & state_bits.STAND) != 0) & ((state & _FROZEN) == 0)
     free &= ((mode != PlayMode.TIME_OVER) & (mode != PlayMode.BEFORE_KICK_OFF))[:, None]
     silent = free & ~heard

@@ -61,3 +61,8 @@ def style(colours: Colours) -> Any:
 def theme_css() -> str:
     """Return the colours of every page as CSS variables of its root."""
     return resources.files(__package__).joinpath("theme.css").read_text("utf-8")
+
+
+def page_css() -> str:
+    """Return the rules of a page of text, tables and figures, its colours included."""
+    return theme_css() + resources.files(__package__).joinpath("page.css").read_text("utf-8")

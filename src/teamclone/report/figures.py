@@ -1,13 +1,8 @@
-"""The figures of the report as SVG text that takes its colours from the page around it, light or dark.
-
-matplotlib knows no CSS, so figures are drawn in stand-in colours that `svg` replaces by CSS variables.
-"""
+"""The figures of the report, in the colours of the page around them."""
 
 from __future__ import annotations
 
-import io
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,50 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from teamclone.plots.fans import draw_fans
+from teamclone.plots.page import ACCENT, COLOURS, INK, KIND_COLOURS, MUTED, SECOND, STYLE, WIDTH
 from teamclone.plots.pitch import draw_pitch
-from teamclone.plots.style import Colours, style
 from teamclone.rcss.commands import CLONED, REPERTOIRE
 
 KINDS = CLONED
 
-INK, MUTED, RULE, ACCENT, SECOND = "#010203", "#010204", "#010205", "#010206", "#010207"
-_STAND_INS = {INK: "ink", MUTED: "muted", RULE: "rule", ACCENT: "accent", SECOND: "second"}
-KIND_COLOURS = {
-    **{"dash": "#3d85c6", "turn": "#dd8a1b", "kick": "#1f9e78", "tackle": "#c75b9b"},
-    **{"catch": "#8a6fd1", "move": "#a3862a", "none": "#7d8791"},
-}
-"""Also legible where they cannot follow the page: in rasterised dots."""
-
 PERCENT = "\N{NARROW NO-BREAK SPACE}%"
-WIDTH = 7.4
-"""Inches; the page scales it to its column."""
-
-_COLOURS = Colours(ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND)
-_STYLE = style(_COLOURS)
-
-
-def svg(figure: Figure, *, name: str, alt: str) -> str:
-    """Return a figure as an inline <svg> element: ids unique by ``name``, a text alternative, colours of the page."""
-    stream = io.StringIO()
-    with mpl.rc_context(_STYLE):
-        figure.savefig(stream, format="svg", transparent=True, dpi=160, metadata={"Date": None, "Creator": None})
-    text = stream.getvalue()
-    text = text[text.index("<svg") :]
-    # The page is one document: ids must not meet, and RDF metadata names schemas that are of no use in it.
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', text)
-    text = re.sub(r'(xlink:href|href)="#([^"]+)"', rf'\1="#{name}-\2"', text)
-    text = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", text)
-    # matplotlib's fonts are not the page's.
-    text = re.sub(r"font: (\S+) '[^;\"]*", r"font: \1 inherit; font-family: inherit", text)
-    for stand_in, variable in _STAND_INS.items():
-        text = text.replace(stand_in, f"var(--{variable})")
-    for kind, colour in KIND_COLOURS.items():
-        text = text.replace(colour, f"var(--{kind})")
-    head = re.compile(r'<svg ([^>]*?)width="[^"]*"([^>]*?)>', re.DOTALL)
-    text = re.sub(r' height="[^"]*pt"', "", text, count=1)
-    label = alt.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
-    return head.sub(lambda match: f'<svg {match[1]}{match[2]} role="img" aria-label="{label}">', text, count=1)
 
 
 def _figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
@@ -73,7 +31,7 @@ def _kinds(given: Mapping[str, Any]) -> list[str]:
     return [kind for kind in REPERTOIRE if kind in KINDS or kind in given]
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[str, int]) -> Figure:
     """Draw Fig. 4: where each command was given, one pitch per command, a sample of points (n, 2) in metres."""
     kinds = _kinds(points)
@@ -90,13 +48,13 @@ def positions(points: Mapping[str, Sequence[Sequence[float]]], counts: Mapping[s
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def fans(drawn: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw where players and ball may go from some moments, and where they went; see ``plots.fans``."""
-    return draw_fans(drawn, colours=_COLOURS, width=WIDTH)
+    return draw_fans(drawn, colours=COLOURS, width=WIDTH)
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def frequencies(counts: Mapping[str, int]) -> Figure:
     """Draw Fig. 5: commands by kind."""
     kinds = _kinds(counts)
@@ -123,7 +81,7 @@ def frequencies(counts: Mapping[str, int]) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def turn_moments(edges: Sequence[float], counts: Sequence[int], *, zero: int, turns: int) -> Figure:
     """Draw Fig. 6: turn moments in degrees, logarithmic; ``zero`` of all ``turns`` are exactly (turn 0)."""
     figure, axes = _figure(2.7)
@@ -151,7 +109,7 @@ CURVES = (
 )
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def training_curves(history: Sequence[Mapping[str, Any]], *, best_epoch: int | None = None) -> Figure:
     """Draw Fig. 7: a panel for every pair of curves in the history, training against validation."""
     epochs = [row["epoch"] for row in history]
@@ -194,7 +152,7 @@ SEEN_UNSEEN = (
 )
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def seen_unseen(splits: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw Fig. 8: figures of every split with 95 % intervals; ``splits`` holds them as {value, low, high}."""
     names = list(splits)
@@ -222,7 +180,7 @@ def seen_unseen(splits: Mapping[str, Mapping[str, Any]]) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def opponents(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw accuracy by opponent with 95 % intervals.
 
@@ -248,7 +206,7 @@ def opponents(rows: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def reliability(calibration: Mapping[str, Any]) -> Figure:
     """Draw reliability diagrams: of the predicted command, and of each command's own probability."""
     figure, (left, right) = _figure(3.5, 1, 2)
@@ -282,7 +240,7 @@ def reliability(calibration: Mapping[str, Any]) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def response_times(edges_us: Sequence[float], counts: Sequence[int], *, p50_us: float, p99_us: float) -> Figure:
     """Draw Fig. 9: histogram of the times of single predictions, microseconds."""
     figure, axes = _figure(2.4)

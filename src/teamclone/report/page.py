@@ -21,7 +21,8 @@ from teamclone.evaluation.evaluate import evaluate_and_save, load_evaluation
 from teamclone.evaluation.latency import load_bench, measure_run
 from teamclone.models.clone import model_id
 from teamclone.models.config import EgocentricPointConfig, PaperConfig
-from teamclone.plots.style import theme_css
+from teamclone.plots.page import svg
+from teamclone.plots.style import page_css
 from teamclone.report import figures
 from teamclone.rollouts.files import load_rollouts
 from teamclone.rollouts.run import MOVERS
@@ -427,7 +428,7 @@ def _plots(
         )
     if ahead is not None:
         drawn["fans"] = (ahead.picture, "Pitches with sampled paths of players and ball, and the paths that they took")
-    return {name: Markup(figures.svg(drawing, name=name, alt=alt)) for name, (drawing, alt) in drawn.items()}
+    return {name: Markup(svg(drawing, name=name, alt=alt)) for name, (drawing, alt) in drawn.items()}
 
 
 def render(
@@ -470,7 +471,7 @@ def render(
         figures=FIGURES,
         percents=PERCENT,
         kinds=tuple(section["commands"]),
-        theme=Markup(theme_css()),
+        theme=Markup(page_css()),
         even_log_loss=metrics.even_log_loss(tuple(section["commands"])),
         support=support,
         sentences=sentences(evaluation),

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from teamclone.plots.page import svg
 from teamclone.plots.pitch import draw_pitch
 from teamclone.report import figures
 
@@ -109,7 +110,7 @@ NAMES = ("positions", "frequencies", "turns", "no turns", "training", "splits", 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_svg_fits_into_a_page(name: str) -> None:
-    text = figures.svg(drawn()[name], name="one", alt='a "figure" <here> & there')
+    text = svg(drawn()[name], name="one", alt='a "figure" <here> & there')
     root = ElementTree.fromstring(text)
     assert root.get("role") == "img"
     assert root.get("aria-label") == 'a "figure" <here> & there'
@@ -126,13 +127,13 @@ def test_svg_fits_into_a_page(name: str) -> None:
 
 
 def test_figures_are_the_same_every_time() -> None:
-    once, again = (figures.svg(drawn()["training"], name="a", alt="") for _ in range(2))
+    once, again = (svg(drawn()["training"], name="a", alt="") for _ in range(2))
     assert once == again
 
 
 def test_dots_of_many_positions_stay_small() -> None:
     spots = np.random.default_rng(0).uniform((-52, -34), (52, 34), (2500, 2)).round(1).tolist()
-    text = figures.svg(figures.positions(dict.fromkeys(figures.KINDS, spots), {}), name="a", alt="")
+    text = svg(figures.positions(dict.fromkeys(figures.KINDS, spots), {}), name="a", alt="")
     assert len(text) < 600_000
 
 
@@ -142,4 +143,4 @@ def test_names_are_no_formulas(name: str) -> None:
         {"opponent": one, "split": "test", "matches": 1, "accuracy": {"value": 0.9, "low": None, "high": None}}
         for one in (name, "Blue")
     ]
-    assert name in figures.svg(figures.opponents(rows), name="opponents", alt="").replace("&amp;", "&")
+    assert name in svg(figures.opponents(rows), name="opponents", alt="").replace("&amp;", "&")

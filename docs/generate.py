@@ -19,6 +19,7 @@ from typer.models import ArgumentInfo
 
 import teamclone
 from teamclone.cli.app import app
+from teamclone.comparison import profile
 from teamclone.events import definitions, statistics
 from teamclone.models.config import FAMILIES
 from teamclone.store import schema
@@ -58,6 +59,9 @@ def pages() -> dict[Path, str]:
         kinds=_kinds(),
         columns=_columns(),
         statistics=_statistics(),
+    )
+    made[_command_page("compare")] = _filled(
+        _command_page("compare"), options=_options("compare"), statistics=_compared()
     )
     made[REFERENCE / "settings.md"] = _filled(REFERENCE / "settings.md", settings=_settings())
     made[REFERENCE / "api.md"] = _filled(REFERENCE / "api.md", api=_api())
@@ -175,6 +179,13 @@ def _columns() -> str:
 def _statistics() -> str:
     """Every statistic of a team."""
     return _table(("statistic", "unit", "meaning"), [(f"`{name}`", *rest) for name, *rest in statistics.described()])
+
+
+def _compared() -> str:
+    """Every statistic that a comparison has beside those of a team's events."""
+    known = {name for name, *_ in statistics.described()}
+    rows = [(f"`{one.name}`", one.unit, one.about) for one in profile.STATISTICS if one.name not in known]
+    return _table(("statistic", "unit", "meaning"), rows)
 
 
 # Settings

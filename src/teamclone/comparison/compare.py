@@ -26,7 +26,7 @@ FORMAT = 1
 DRAWS = 200
 """Random halves that a distance is the mean over."""
 HISTOGRAM_RESAMPLES = 200
-HISTOGRAM_DRAWS = 20
+HISTOGRAM_DRAWS = 10
 """Of the intervals of histograms, which cost more and differ less from draw to draw than single numbers."""
 LEAST = (4, 2)
 """How many matches of the original and of the clone, against one opponent or all, give a distance."""

@@ -99,14 +99,19 @@ def of_means(one: Floats, of_one: Floats, other: Floats, of_other: Floats) -> Fl
 
 
 def cumulated(counts: NDArray[np.integer]) -> Floats:
-    """Return histograms (..., bins) as counts up to the end of each bin, which sums over matches keep."""
-    return counts.cumsum(axis=-1).astype(np.float64)
+    """Return histograms (..., bins) as counts up to the end of each bin, which sums over matches keep.
+
+    In single precision, which has every whole number up to 16 million and is twice as fast.
+    """
+    return counts.cumsum(axis=-1).astype(np.float32)
 
 
 def _apart(one: Floats, other: Floats) -> Floats:
     """Return the Wasserstein distance, in bins, of cumulated histograms (..., bins); NaN where one is empty."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        found: Floats = np.abs(one / one[..., -1:] - other / other[..., -1:]).sum(axis=-1)
+        apart = one / one[..., -1:]
+        apart -= other / other[..., -1:]
+    found: Floats = np.abs(apart, out=apart).sum(axis=-1)
     return found
 
 
@@ -120,7 +125,9 @@ def cells(one: Floats, of_one: Floats, other: Floats, of_other: Floats) -> tuple
 
     The distance is in bins, the weight the share of the player's time with the ball there that both have.
     """
-    first, second = (np.tensordot(which, values, axes=1) for which, values in ((of_one, one), (of_other, other)))
+    first, second = (
+        np.tensordot(which.astype(values.dtype), values, axes=1) for which, values in ((of_one, one), (of_other, other))
+    )
     totals = [each[..., -1] for each in (first, second)]
     with np.errstate(invalid="ignore", divide="ignore"):
         weight = np.minimum(*(total / total.sum(axis=(1, 2, 3), keepdims=True) for total in totals))

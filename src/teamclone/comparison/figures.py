@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, PercentFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator, PercentFormatter
 
 from teamclone.comparison.profile import ZONES
 from teamclone.comparison.words import label_of, name_of
@@ -20,6 +20,9 @@ from teamclone.rcss import pitch
 _WHOSE = (("original", SECOND, -0.16), ("clone", ACCENT, 0.16))
 _LEAST_UNITS, _MOST_UNITS = 0.1, 100.0
 """Ends of the axis of units; what is beyond stands at its end."""
+
+_LONGEST = 20
+"""Characters of a name that the margin has room for; the server allows fewer."""
 
 Groups = Sequence[Mapping[str, Any]]
 
@@ -48,7 +51,7 @@ def statistic(groups: Groups, at: int, *, name: str, unit: str, matches: Sequenc
             _point(left, row[whose], y + shift, colour)
         if row.get("units"):
             _units(right, row, y)
-    _label(left, right, [f"{label_of(group)}, {_counts(group)}" for group in groups])
+    _label(left, right, [_row_name(group) for group in groups])
     left.set_xlabel(_axis(name, unit))
     if unit == "share":
         left.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=None))
@@ -119,9 +122,18 @@ def speeds(shares: Mapping[str, Any]) -> Figure:
 
 
 def _two_panels(rows: int) -> tuple[Figure, tuple[Any, Any]]:
-    figure = Figure(figsize=(WIDTH, 0.75 + 0.42 * rows), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1))
+    # Margins are given, since finding them costs as much as the drawing, and there is one picture a statistic.
+    height = 0.75 + 0.42 * rows
+    figure = Figure(figsize=(WIDTH, height))
+    edges: Any = {"left": 0.27, "right": 0.97, "bottom": 0.55 / height, "top": 1 - 0.1 / height, "wspace": 0.1}
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1), gridspec_kw=edges)
     return figure, (left, right)
+
+
+def _row_name(group: Mapping[str, Any]) -> str:
+    """Return opponent and numbers of matches, a name of any length cut to the margin."""
+    name = label_of(group)
+    return f"{name if len(name) <= _LONGEST else f'{name[: _LONGEST - 1]}…'}, {_counts(group)}"
 
 
 def _counts(group: Mapping[str, Any]) -> str:
@@ -156,8 +168,9 @@ def _units(axes: Any, row: Mapping[str, Any], y: float) -> None:
 def _unit_axis(axes: Any) -> None:
     axes.set_xscale("log")
     axes.set_xlim(_LEAST_UNITS * 0.9, _MOST_UNITS * 1.1)
+    axes.xaxis.set_major_locator(FixedLocator([0.1, 0.3, 1, 3, 10, 30, 100]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.axvline(1.0, color=INK, linewidth=0.9, linestyle=(0, (3, 3)), zorder=1)
     axes.set_xlabel("distance, in the original's own")
 

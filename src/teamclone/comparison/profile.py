@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from teamclone.events import definitions
 from teamclone.events.statistics import described, team_statistics
 from teamclone.logs.align import plays_on
-from teamclone.logs.columns import counter_name
+from teamclone.logs.columns import Source, counter_name
 from teamclone.logs.match import Columns
 from teamclone.play.holes import holes_of
 from teamclone.rcss import pitch, server_params
@@ -25,7 +25,7 @@ from teamclone.world.channels import FLAG_CHARGED, FLAG_GOALIE, FLAG_ON_FIELD, F
 from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS, view_columns
 from teamclone.world.world import World
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 Counts = NDArray[np.int64]
 
 
@@ -130,8 +130,7 @@ def profile(store: Store, row: Mapping[str, Any], *, side: int) -> Profile:
     world = view_columns(frames, players, params=params, side=side)
     goes_on = plays_on(frames)
     values = _of_events(store, match_id, side) | _stamina(world, params)
-    if row["command_log"] is not None:
-        values |= _holes(frames, players, _commands(store, match_id), side)
+    values |= _holes(frames, players, _commands(store, match_id), side)
     # Logs may hold any number as a place; what follows from one that is none is left out.
     with np.errstate(all="ignore"):
         ways = _ways(world, goes_on)
@@ -172,10 +171,15 @@ def _of_events(store: Store, match_id: str, side: int) -> dict[str, float]:
 
 
 def _commands(store: Store, match_id: str) -> Columns:
-    return store.read_match_columns(match_id, schema.COMMANDS.name, columns=("frame", "side", "unum", "kind", "valid"))
+    return store.read_match_columns(
+        match_id, schema.COMMANDS.name, columns=("frame", "side", "unum", "kind", "valid", "source")
+    )
 
 
 def _holes(frames: Columns, players: Columns, commands: Columns, side: int) -> dict[str, float]:
+    # Recovered commands are those that were executed: they know neither what was sent twice nor what was not.
+    if not (commands["source"] == Source.LOGGED).any():
+        return {}
     found, team = holes_of(frames, players, commands), TEAM_SLOTS[0 if side > 0 else 1]
     return {"holes": float(found.holes[team].sum()), "clashes": float(found.clashes[team].sum())}
 

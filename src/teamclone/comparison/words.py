@@ -25,7 +25,7 @@ def amount(value: float | None, unit: str) -> str:
     if value is None:
         return NOTHING
     if unit == "share":
-        return f"{100 * value:.1f} %"
+        return f"{amount(100 * value, '')} %"
     digits = 0 if abs(value) >= 1000 else 1 if abs(value) >= 10 else 2 if abs(value) >= 1 else 3
     return f"{value:,.{digits}f}"
 

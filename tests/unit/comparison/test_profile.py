@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compared import TEAM, made_store
+from compared import TEAM, made_store, variant
 from teamclone.comparison.profile import N_BINS, NUMBERS, Profile, profile, zones
 from teamclone.logs import Match, read_match
+from teamclone.play.holes import count_holes
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.store.store import Store
@@ -77,7 +78,8 @@ def test_stamina_is_that_of_the_last_cycles_of_the_halves(made: Profile, match: 
         assert value(made, name) == pytest.approx(match.players["stamina"][frame, 11:][field].mean(), rel=1e-5)
 
 
-def test_holes_need_a_command_log(made: Profile, store: Store) -> None:
-    assert value(made, "holes") >= 0
-    (row,) = store.matches().to_pylist()
-    assert np.isnan(value(profile(store, row | {"command_log": None}, side=-1), "holes"))
+def test_holes_need_a_command_log(made: Profile, match: Match, tmp_path: Path) -> None:
+    assert value(made, "holes") == count_holes(match).holes[11:].sum()
+    without = made_store(tmp_path / "store", [variant(match, 0)])
+    (row,) = without.matches().to_pylist()
+    assert np.isnan(value(profile(without, row, side=-1), "holes"))

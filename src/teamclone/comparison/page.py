@@ -25,8 +25,8 @@ def render(document: Mapping[str, Any]) -> str:
         "name": words.name_of,
         "label": words.label_of,
         "amount": words.amount,
-        "interval": words.with_interval,
-        "units": words.units,
+        "interval": lambda figure, unit: _stacked(words.with_interval(figure, unit)),
+        "units": lambda row: _stacked(words.units(row)),
     }
     template = environment.from_string(resources.files(__package__).joinpath("comparison.html.j2").read_text("utf-8"))
     return template.render(
@@ -40,6 +40,13 @@ def render(document: Mapping[str, Any]) -> str:
         few=bootstrap.FEW_MATCHES,
         extra=_EXTRA,
     )
+
+
+def _stacked(text: str) -> Markup:
+    """Return a number with its interval on a line of its own."""
+    value, _, interval = text.removesuffix(")").partition(" (")
+    small = Markup('<small class="interval">{}</small>').format(interval) if interval else ""
+    return Markup("{}{}").format(value, small)
 
 
 def main_group(document: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -56,8 +63,8 @@ def sentence(document: Mapping[str, Any]) -> str:
     middle = sorted(row["units"]["value"] for row in rows)[len(rows) // 2] if rows else None
     return (
         f"In {group['matches']['original']} matches of the original and {group['matches']['clone']} of the clone, half "
-        f"of {len(rows)} statistics are within {words.amount(middle, '')} of the original's own distances; of "
-        f"{len(above)} the 95 % interval lies above 1."
+        f"of {len(rows)} statistics are at most {words.amount(middle, '')} units away; of {len(above)} the 95 % "
+        "interval lies above 1."
     )
 
 

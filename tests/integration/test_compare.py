@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,25 @@ from typer.testing import CliRunner
 import teamclone as tc
 from compared import TEAM, made_store, samples, variant
 from teamclone.cli.app import app
+from teamclone.comparison import compare
 from teamclone.comparison.compare import FORMAT
 from teamclone.comparison.profile import STATISTICS
 from teamclone.errors import UsageError
+from teamclone.evaluation import bootstrap
 from teamclone.logs import Match
 
 HOSTILE = "<script>alert(1)</script>$x"
 """A name of an opponent, which is anybody's."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick() -> Iterator[None]:
+    """Fewer draws: what they are good for, `tests/unit/comparison` asks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bootstrap, "N_RESAMPLES", 50)
+        patch.setattr(compare, "DRAWS", 40)
+        patch.setattr(compare, "HISTOGRAM_RESAMPLES", 10)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -32,13 +32,18 @@ def watch(
 ) -> None:
     """Predict every cycle of a match that is being played, and score each prediction one cycle later."""
     import signal
+    from threading import Event
 
     from teamclone.live.watch import WatchConfig
     from teamclone.live.watch import watch as watch_match
     from teamclone.training.run import open_run
 
+    stopped = Event()
+
     def stop(*_: object) -> None:
-        raise KeyboardInterrupt
+        if stopped.is_set():
+            raise KeyboardInterrupt
+        stopped.set()
 
     config = WatchConfig(
         host=host,
@@ -50,12 +55,14 @@ def watch(
         silence_s=silence,
         score_every=10 if sys.stdout.isatty() and not as_json else 100,
     )
-    before = signal.signal(signal.SIGTERM, stop)  # ends the watch as Ctrl-C does: with its score, and with the log
+    # The first signal ends the watch after the cycle at hand, with its score and whole lines; a second one at once.
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         with _Screen(as_json=as_json) as screen:
-            end = watch_match(open_run(run), config, checkpoint=checkpoint, on_event=screen.show)
+            end = watch_match(open_run(run), config, checkpoint=checkpoint, on_event=screen.show, stop=stopped)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     if not as_json:
         _print_end(end)
 

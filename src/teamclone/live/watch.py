@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +43,7 @@ _CONTEXT = 20
 _WITH_BALL = (CommandKind.KICK, CommandKind.TACKLE)
 """Commands that are answered only where the ball may be reached."""
 
-Event = dict[str, Any]
+Happening = dict[str, Any]
 """What happened, JSON types only: ``event`` names it."""
 
 
@@ -69,11 +70,22 @@ class WatchConfig:
     score_every: int = 100
 
 
-def watch(run: Run, config: WatchConfig, *, checkpoint: str = "best-loss", on_event: Callable[[Event], None]) -> Event:
-    """Watch a match to its end, or until it is interrupted.
+def watch(
+    run: Run,
+    config: WatchConfig,
+    *,
+    checkpoint: str = "best-loss",
+    on_event: Callable[[Happening], None],
+    stop: Event | None = None,
+) -> Happening:
+    """Watch a match to its end, or until it is told to stop.
 
     Events are ``ready`` (the server is asked now), ``start`` (whom we watch), for each cycle ``prediction`` and, when
     the next one has come, ``done``, now and then ``score``, and ``end``, which is returned, too.
+
+    Args:
+        stop: set by whoever wants the watch to end after the cycle at hand, with all that is known. An interrupt ends
+            it at once.
 
     Raises:
         LiveError: no server answers, it lets us not in, or the team does not play.
@@ -87,7 +99,7 @@ def watch(run: Run, config: WatchConfig, *, checkpoint: str = "best-loss", on_ev
     watcher = _Watcher(run, config, checkpoint, on_event)
     stream = MonitorStream(config.port, host=config.host)
     try:
-        return watcher.follow(stream)
+        return watcher.follow(stream, stop or Event())
     finally:
         stream.close()
         watcher.close()
@@ -96,7 +108,7 @@ def watch(run: Run, config: WatchConfig, *, checkpoint: str = "best-loss", on_ev
 class _Watcher:
     """What is known of the match so far."""
 
-    def __init__(self, run: Run, config: WatchConfig, checkpoint: str, on_event: Callable[[Event], None]) -> None:
+    def __init__(self, run: Run, config: WatchConfig, checkpoint: str, on_event: Callable[[Happening], None]) -> None:
         self._config, self._tell = config, on_event
         model = run.load_model(checkpoint).eval()
         self._clone = CompiledClone(pack(model))
@@ -117,30 +129,33 @@ class _Watcher:
         load_kernels(self._clone, history=model.inputs.history)
         self._tell({"event": "ready", "teams": self._teams, "baselines": data is not None})
 
-    def follow(self, stream: MonitorStream) -> Event:
-        """Take in all that comes until the match ends."""
+    def follow(self, stream: MonitorStream, stop: Event) -> Happening:
+        """Take in all that comes until the match ends.
+
+        Raises:
+            KeyboardInterrupt: it was told to stop before anything came.
+        """
         heard_at = time.monotonic()
         ended: str | None = None
-        try:
-            while ended is None:
-                got = stream.next(_POLL_S)
-                now = time.monotonic()
-                if got is None:
-                    ended = self._silent(now - heard_at)
-                elif isinstance(got, Message):
-                    if self._writer is not None:
-                        self._writer.message(got.text)
-                else:
-                    heard_at = now
-                    self._take(got, stream)
-                    ended = "time_over" if got.show.over else None
-                waiting = len(self._seen) - 1 - self._scored
-                if waiting > 0 and (stream.behind == 0 or waiting >= _AT_ONCE or ended):
-                    self._look_back()
-        except KeyboardInterrupt:
-            if self._last is None:
-                raise
-            ended = "interrupted"
+        while ended is None:
+            got = stream.next(_POLL_S)
+            now = time.monotonic()
+            if got is None:
+                ended = self._silent(now - heard_at)
+            elif isinstance(got, Message):
+                if self._writer is not None:
+                    self._writer.message(got.text)
+            else:
+                heard_at = now
+                self._take(got, stream)
+                ended = "time_over" if got.show.over else None
+            if ended is None and stop.is_set():
+                if self._last is None:
+                    raise KeyboardInterrupt
+                ended = "interrupted"
+            waiting = len(self._seen) - 1 - self._scored
+            if waiting > 0 and (stream.behind == 0 or waiting >= _AT_ONCE or ended):
+                self._look_back()
         return self._end(ended, stream)
 
     def close(self) -> None:
@@ -227,10 +242,10 @@ class _Watcher:
             self._told = stop // self._config.score_every
             self._tell({"event": "score", **self._figures()})
 
-    def _end(self, ended: str, stream: MonitorStream) -> Event:
+    def _end(self, ended: str, stream: MonitorStream) -> Happening:
         """Return the last event: the score, and of the whole match the errors of parameters."""
         counts = asdict(self._seen.counts)
-        event: Event = {"event": "end", "ended": ended, **self._figures()}
+        event: Happening = {"event": "end", "ended": ended, **self._figures()}
         if self._expected is not None and self._scored > 0:
             whole = done_on(self._seen, self._expected, 0, self._scored)
             event["parameters"] = parameter_errors(whole)
@@ -241,7 +256,7 @@ class _Watcher:
         self._tell(event)
         return event
 
-    def _figures(self) -> Event:
+    def _figures(self) -> Happening:
         show = self._last
         return {
             "cycle": None if show is None else show.cycle,
@@ -252,7 +267,7 @@ class _Watcher:
             "latency": self._latency(),
         }
 
-    def _latency(self) -> Event:
+    def _latency(self) -> Happening:
         times = np.array(self._times_ms)
         if not len(times):
             return {"n": 0}
@@ -264,11 +279,11 @@ class _Watcher:
             "late": int((times > LIMIT_MS).sum()),
         }
 
-    def _place(self, index: int) -> Event:
+    def _place(self, index: int) -> Happening:
         cycle, stoppage = self._seen.cycle(index)
         return {"cycle": cycle, "stoppage": stoppage}
 
-    def _prediction(self, actor: NDArray[np.int64], took_ms: float) -> Event:
+    def _prediction(self, actor: NDArray[np.int64], took_ms: float) -> Happening:
         """Return what is expected of the players ``actor`` in the newest frame."""
         now, expected = len(self._seen) - 1, self._expected
         assert expected is not None
@@ -293,10 +308,10 @@ class _Watcher:
             )
         return {"event": "prediction", **self._place(now), "ms": took_ms, "players": players}
 
-    def _done(self, done: Done) -> Iterator[Event]:
+    def _done(self, done: Done) -> Iterator[Happening]:
         """Yield what was done in each frame."""
         losses = metrics.log_loss(done.outcome.probabilities, done.outcome.kind).tolist()
-        rows: dict[int, list[Event]] = {}
+        rows: dict[int, list[Happening]] = {}
         for row, frame in enumerate(done.frame.tolist()):
             kind = int(done.outcome.kind[row])
             command = self._clone.commands[kind]
@@ -312,7 +327,7 @@ class _Watcher:
         for frame, players in rows.items():
             yield {"event": "done", **self._place(frame), "players": players}
 
-    def _moment(self, moment: Moment) -> Event:
+    def _moment(self, moment: Moment) -> Happening:
         commands = self._clone.commands
         return {
             **self._place(moment.frame),

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
-from scipy.stats import rankdata
 
 from teamclone.dataset.layout import CATEGORICAL_INDEX
 from teamclone.dataset.reader import Dataset
@@ -80,6 +78,8 @@ class LineUp:
         Raises:
             ValueError: there are fewer types than players.
         """
+        from scipy.optimize import linear_sum_assignment  # takes half a second, which few need
+
         if len(types) < N_TEAM:
             raise ValueError(f"expected at least {N_TEAM} player types, got {len(types)}")
         ranks = _ranks(types)
@@ -123,19 +123,23 @@ def _preferences(
     """Return (11, len(TRAITS)) mean and standard deviation of the traits of the types that the players were given.
 
     Args:
-        given: (n, 11) types at the beginning of n matches. matches: (n,) their indices.
+        given: (n, 11) types at the beginning of n matches. matches: (n,) their indices. Those whose log does not say
+            are left out; where none says, all types are the same to every player.
     """
-    had = np.stack(
-        [
-            _ranks(dataset.player_types[match].numpy().astype(np.float64))[types]
-            for match, types in zip(matches.tolist(), given, strict=True)
-        ]
-    )
-    return had.mean(axis=0), np.maximum(had.std(axis=0), _LEAST_SPREAD)
+    had = [
+        _ranks(dataset.player_types[match].numpy())[types]
+        for match, types in zip(matches.tolist(), given, strict=True)
+        if types.max() < dataset.player_types.shape[1]
+    ]
+    if not had:
+        return np.zeros((N_TEAM, len(TRAITS))), np.ones((N_TEAM, len(TRAITS)))
+    return np.mean(had, axis=0), np.maximum(np.std(had, axis=0), _LEAST_SPREAD)
 
 
 def _ranks(types: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return (n_types, len(TRAITS)) the ranks of the types of a match by each trait, from 0 to 1."""
+    from scipy.stats import rankdata
+
     of = {name: types[:, TYPE_FIELD[name]].astype(np.float64) for name in FIELDS}
     reached = _FULL_POWER * of["dash_power_rate"] * of["effort_max"] / (1 - of["player_decay"])
     of["top_speed"] = np.minimum(reached, of["player_speed_max"])

@@ -29,7 +29,7 @@ def team(
     host: Annotated[str, typer.Option(help="The server's host.")] = "127.0.0.1",
     name: Annotated[str | None, typer.Option(help="The team's name; that of the original unless given.")] = None,
     draw: Annotated[
-        str, typer.Option(help="commands: draw which command, with its likeliest numbers; all: the numbers, too.")
+        str, typer.Option(help="What is random: commands, cases (also which of several cases), all (also the numbers).")
     ] = "commands",
     deterministic: Annotated[
         bool, typer.Option("--deterministic", help="Draw nothing: always the likeliest command.")
@@ -66,7 +66,7 @@ def team(
         name=called,
         host=host,
         port=port,
-        coach_port=port + 2 if coach_port is None else coach_port,
+        coach_port=min(port + 2, 65535) if coach_port is None else coach_port,
     )
     try:
         playing.play(connect_s=connect_s)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -183,16 +183,15 @@ def standin(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Standin]
 
 def wait_for_play(server: Standin) -> None:
     """Waits until the whole team has been in play for some cycles."""
-    monitor, end = MonitorClient(server.port), time.monotonic() + 120
-    whole = None
-    while time.monotonic() < end:
-        show = monitor.latest()
-        if show is not None and show.begun and len(show.present[0]) == N_TEAM:
-            whole = whole or show.cycle
-            if show.cycle > whole + 20:
-                monitor.close()
-                return
-        time.sleep(0.02)
+    whole, end = None, time.monotonic() + 120
+    with closing(MonitorClient(server.port)) as monitor:
+        while time.monotonic() < end:
+            show = monitor.latest()
+            if show is not None and show.begun and len(show.present[0]) == N_TEAM:
+                whole = whole or show.cycle
+                if show.cycle > whole + 20:
+                    return
+            time.sleep(0.02)
     raise AssertionError("the match did not begin")
 
 

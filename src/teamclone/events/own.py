@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.dynamics import formulas
 from teamclone.events.definitions import (
     CLEARANCE_M,
     CONTROL_M,
@@ -158,7 +157,8 @@ def _shots(play: Play, ends: Endings, scored: Found) -> tuple[Bools, Bools]:
         & ~again
         & ~np.isin(ends.frame, scored.frame)
         & (np.hypot(vx, vy) >= SHOT_SPEED * play.speed_max)
-        & (cycles <= formulas.roll(np.inf, play.decay) * play.decay)
+        # As far as `formulas.roll` takes it in the end, multiplied by what is 0 of a ball that never slows down.
+        & (np.where(forward, cycles, 0) * (1 - play.decay) <= play.decay)
         & (passes <= mouth + SHOT_MARGIN_M)
         & (np.hypot(to_line, after[:, 1]) <= SHOT_RANGE_M)
     )

@@ -32,6 +32,7 @@ class Seat:
 
     Attributes:
         returns: whether the player was there before and lost its connection.
+        knocked_at, heard_at: when it last asked to take part, and when the server last spoke to it or was last probed.
         refusal: why the server does not take it back.
     """
 
@@ -39,6 +40,7 @@ class Seat:
     client: AgentClient
     returns: bool = False
     knocked_at: float = -math.inf
+    heard_at: float = -math.inf
     refusal: str = ""
     sense: Sense | None = None
     state: bytes = b""
@@ -118,8 +120,9 @@ class Seats:
                 if waiting.returns
                 else agent.init(self._name, self.version, goalie=waiting.unum == self._goalkeeper)
             )
-        if now - self.heard_at > _PROBE_S:
-            for seat in self.joined:
+        for seat in self.joined:
+            if now - seat.heard_at > _PROBE_S:
+                seat.heard_at = now
                 seat.client.send(agent.commands([agent.DONE]))
 
     def _client(self) -> AgentClient:
@@ -134,7 +137,7 @@ class Seats:
         select.select(open_ones, [], [], 0.0 if self.due else wait_s)
         for seat in self._seats:
             for datagram in seat.client.receive() if not seat.client.gone else ():
-                self.heard_at = time.monotonic()
+                self.heard_at = seat.heard_at = time.monotonic()
                 self._take(seat, datagram)
 
     def _take(self, seat: Seat, datagram: bytes) -> None:

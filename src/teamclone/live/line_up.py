@@ -51,11 +51,12 @@ class TypesByCoach:
         """True once all players have their types, or the server wants no coach of this team."""
         return bool(self.refusal) or self._left == {}
 
-    def work(self, types: Mapping[int, Mapping[str, float]]) -> None:
+    def work(self, types: Mapping[int, Mapping[str, float]], *, whole: bool) -> None:
         """Go on with the work, as far as the server's answers allow; never waits.
 
         Args:
             types: parameters of the player types of the match by number.
+            whole: whether all players are there, so that each can be given a type.
         """
         for datagram in self._client.receive():
             refusal = agent.refusal_of(datagram)
@@ -65,7 +66,9 @@ class TypesByCoach:
             if changed and self._left and self._left.get(changed[0]) == changed[1]:
                 del self._left[changed[0]]
         now = time.monotonic()
-        if self.done or now - self._asked_at < _ASK_S:
+        # The server may kick off soon after the last player has come, so types are not kept waiting.
+        begins = self._client.welcomed and whole and self._left is None
+        if self.done or (self._client.welcomed and not whole) or (now - self._asked_at < _ASK_S and not begins):
             return
         self._asked_at = now
         if not self._client.welcomed:

@@ -149,14 +149,15 @@ class Team:
     def _give_types(self) -> None:
         """Let the coach go on with giving types, until the kick-off."""
         seats = self._seats
-        if not self._coach_port or self._cycle > 0 or len(seats.joined) < N_TEAM or len(seats.types) < N_TEAM:
+        if not self._coach_port or self._cycle > 0 or not seats.joined:
             return
         if self._coach is None:
             self._coach = TypesByCoach(
                 self._line_up, team=self._name, host=self._host, port=self._coach_port, version=seats.version
             )
         if not self._coach.done:
-            self._coach.work(seats.types)
+            whole = len(seats.joined) == N_TEAM and len(seats.types) >= N_TEAM
+            self._coach.work(seats.types, whole=whole)
         self.summary.types = self._coach.done and not self._coach.refusal
 
     def _answer(self) -> None:

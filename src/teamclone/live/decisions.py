@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 
 from teamclone.engine.clone import CompiledClone
 from teamclone.engine.inputs.layout import PAST_FRAMES
-from teamclone.engine.inputs.project import Frames
-from teamclone.engine.network.draw import UNIFORMS
+from teamclone.engine.network.draw import COMPONENT, DASH_DIRECTION, FIRST, KIND, SECOND, UNIFORMS
+from teamclone.live.asking import ask, load_kernels
 from teamclone.rcss.commands import CommandKind, parameters_of
-from teamclone.rcss.players import N_PLAYERS, N_TEAM
-from teamclone.world.state import State
-from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS, view_columns
 from teamclone.world.world import World
 
 HISTORY = PAST_FRAMES
@@ -40,10 +37,14 @@ class Draw(StrEnum):
     ALL = "all"
     """Commands and their numbers."""
 
-    @property
-    def fixed(self) -> slice:
-        """Which of command and case are not drawn."""
-        return slice({Draw.NOTHING: 0, Draw.COMMANDS: 1}.get(self, 2), None)
+
+_MOST_PROBABLE = {
+    Draw.NOTHING: (KIND, COMPONENT, DASH_DIRECTION),
+    Draw.COMMANDS: (COMPONENT, DASH_DIRECTION),
+    Draw.CASES: (DASH_DIRECTION,),
+    Draw.ALL: (),
+}
+"""Random numbers in whose place the most probable is taken."""
 
 
 class Decisions:
@@ -62,9 +63,7 @@ class Decisions:
 
     def load(self) -> None:
         """Load or compile the kernels, which else happens at the first answer; use it before time matters."""
-        nobody = {name: np.zeros(1, np.int32) for name in FRAME_COLUMNS}
-        players = {name: np.zeros((1, N_PLAYERS), np.int32) for name in PLAYER_COLUMNS}
-        self.of(view_columns(nobody, players, params={}, side=1), range(1, N_TEAM + 1))
+        load_kernels(self._clone, history=HISTORY)
 
     def of(
         self, world: World, unums: Sequence[int], *, movers: Collection[int] = (), catchers: Collection[int] = ()
@@ -76,20 +75,15 @@ class Decisions:
         """
         if not unums:
             return {}
-        actors = np.asarray(unums, np.int64) - 1
-        state = State.of(world, np.full(len(actors), len(world) - 1), actors, history=HISTORY)
-        *frames, frame, actor = (part.numpy() for part in state)
-        answers, _ = self._clone.answers(Frames(*frames), frame, actor)
+        answers, _ = ask(self._clone, world, np.asarray(unums, np.int64) - 1, history=HISTORY)
         network = self._clone.network
         for unum, answer in zip(unums, answers, strict=True):
             self._bar(network.view(answer).probabilities, unum in movers, unum in catchers)
-        uniforms = self._random.random((len(actors), UNIFORMS))
-        if self._draw is Draw.ALL:
-            chosen, numbers = network.samples(answers, uniforms)
-        else:
-            which = uniforms[:, :2]
-            which[:, self._draw.fixed] = -1.0
-            chosen, numbers = network.choices(answers, which)
+        uniforms = self._random.random((len(unums), UNIFORMS))
+        uniforms[:, _MOST_PROBABLE[self._draw]] = -1.0
+        if self._draw is not Draw.ALL:
+            uniforms[:, (FIRST, SECOND)] = 0.5  # power and direction of a kick stay those of one component
+        chosen, numbers = network.samples(answers, uniforms)
         orders = {}
         for unum, place, values in zip(unums, chosen.tolist(), numbers.tolist(), strict=True):
             kind = self._kinds[place]

@@ -17,8 +17,9 @@ from teamclone.engine.clone import CompiledClone
 from teamclone.errors import DatasetError, LiveError, UsageError, choose
 from teamclone.evaluation import metrics
 from teamclone.evaluation.evaluate import count_training
+from teamclone.live.asking import load_kernels
 from teamclone.live.watch_frames import Seen
-from teamclone.live.watch_predict import Expected, Subject, load_kernels
+from teamclone.live.watch_predict import Expected, Subject
 from teamclone.live.watch_save import RcgWriter
 from teamclone.live.watch_score import Done, Moment, Score, calibration_error, done_on, parameter_errors
 from teamclone.models.packing import pack

@@ -39,11 +39,12 @@ class Seen:
     """The frames so far.
 
     Attributes:
-        counts: what became of the datagrams.
+        counts: what became of the datagrams. mode_cycles: of the newest frame, see `view.mode_cycles`.
     """
 
     def __init__(self) -> None:
         self.counts = Counts()
+        self.mode_cycles = 0
         self._frames = empty_columns(FRAMES, _ROOM)
         self._players = empty_columns(PLAYERS, _ROOM, N_PLAYERS)
         self._last: Frame | None = None
@@ -92,10 +93,15 @@ class Seen:
         if index == len(self._frames["cycle"]):
             self._frames = _joined(self._frames, empty_columns(FRAMES, index))
             self._players = _joined(self._players, empty_columns(PLAYERS, index, N_PLAYERS))
-        same = index > 0 and self._frames["cycle"][index - 1] == show.cycle
+        before = (
+            {name: int(self._frames[name][index - 1]) for name in ("cycle", "stoppage", "playmode")} if index else {}
+        )
+        same = bool(before) and before["cycle"] == show.cycle
+        follows = bool(before) and show.cycle - before["cycle"] <= 1
+        self.mode_cycles = self.mode_cycles + 1 if follows and before["playmode"] == known_mode(show) else 0
         values = {
             "cycle": show.cycle,
-            "stoppage": self._frames["stoppage"][index - 1] + 1 if same else 0,
+            "stoppage": before["stoppage"] + 1 if same else 0,
             "playmode": known_mode(show),
             "left_score": min(show.scores[0], MAX_SCORE),
             "right_score": min(show.scores[1], MAX_SCORE),

@@ -12,18 +12,15 @@ from numpy.typing import NDArray
 from teamclone.dataset.clean import as_stored, players_to_model, whole_frames
 from teamclone.dynamics.rules import check_parameters
 from teamclone.engine.clone import CompiledClone
-from teamclone.engine.inputs.project import Frames
 from teamclone.errors import LiveError, UsageError
+from teamclone.live.asking import ask
 from teamclone.live.watch_frames import Seen
 from teamclone.logs.match import Columns
 from teamclone.protocol.monitor_stream import Parameters
 from teamclone.rcss.commands import parameters_of
-from teamclone.rcss.player_types import DEFAULTS, FIELDS
-from teamclone.rcss.players import N_PLAYERS, N_TEAM
-from teamclone.rcss.playmodes import PlayMode
-from teamclone.rcss.server_params import SERVER_DEFAULTS
+from teamclone.rcss.players import N_TEAM
 from teamclone.world.channels import CHANNEL
-from teamclone.world.view import mode_cycles, view_columns
+from teamclone.world.view import view_columns
 from teamclone.world.world import World
 
 _ROOM = 1024
@@ -97,12 +94,10 @@ class Expected:
         if not whole[-1] or self._lacks(world):
             self.lacking += 1
             return actor[:0]
-        since = mode_cycles(seen.window(0, now + 1)[0])[-1:]
         # Only frames in play have samples, and a model has learned no past from others.
         past = world.select(np.flatnonzero(due.any(axis=1) & whole))
-        answers, near = self.clone.answers(
-            _frames(past, since, history=subject.history), np.zeros(len(actor), np.int64), actor
-        )
+        since = np.full(len(past), seen.mode_cycles, np.int32)  # the play mode may have begun before the window
+        answers, near = ask(self.clone, replace(past, mode_cycles=since), actor, history=subject.history)
         for row, player in enumerate(actor):
             answer = self.clone.network.view(answers[row])
             self.probabilities[now, player], self.parameters[now, player] = answer.probabilities, answer.parameters
@@ -114,42 +109,7 @@ class Expected:
         return bool(np.isnan(world.ball[-1]).any() or np.isnan(world.players[-1][:, reads]).any())
 
 
-def _frames(world: World, since: NDArray[np.int32], *, history: int) -> Frames:
-    """Return the last frame of a world as the kernels take it, ``since`` (1,) frames after its play mode began."""
-    now = np.array([len(world) - 1])
-    past, known = world.past(now, history)
-    return Frames(
-        ball=world.ball[now],
-        players=world.players[now],
-        types=world.types_of(now),
-        server=world.server[None].astype(np.float32),
-        past_ball=world.ball[past],
-        past_players=world.players[past],
-        past_known=known,
-        mode=world.mode[now],
-        mode_cycles=since.astype(np.float32),
-    )
-
-
 def _roomier(values: NDArray[Any]) -> NDArray[Any]:
     """Return an array with as much room again: NaN, or False."""
     empty = np.nan if values.dtype.kind == "f" else 0
     return np.concatenate([values, np.full_like(values, empty)])
-
-
-def load_kernels(clone: CompiledClone, *, history: int) -> None:
-    """Load or compile what `Expected.predict` calls, which else happens in the first cycle."""
-    players = np.zeros((1, N_PLAYERS, len(CHANNEL)), np.float32)
-    types = np.array([[[DEFAULTS[name] for name in FIELDS]] * N_PLAYERS], np.float32)
-    frames = Frames(
-        ball=np.zeros((1, 4), np.float32),
-        players=players,
-        types=types,
-        server=SERVER_DEFAULTS[None].astype(np.float32),
-        past_ball=np.zeros((1, history, 4), np.float32),
-        past_players=np.zeros((1, history, *players.shape[1:]), np.float32),
-        past_known=np.zeros((1, history), np.bool_),
-        mode=np.array([PlayMode.PLAY_ON]),
-        mode_cycles=np.zeros(1, np.float32),
-    )
-    clone.answers(frames, np.zeros(1, np.int64), np.zeros(1, np.int64))

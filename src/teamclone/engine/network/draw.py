@@ -15,15 +15,31 @@ from teamclone.system.compiling import kernel
 
 UNIFORMS = 5
 """Random numbers in [0, 1) that a drawn command takes: its kind; the component of its parameters; its first number; the
-direction of a dash; its second number, or how far within its class the direction of a dash, tackle or catch is."""
+direction of a dash; its second number, or how far within its class the direction of a dash, tackle or catch is.
+
+Where one chooses among kinds, components or directions a negative number stands for the most probable; half stands for
+the centre of a component or class."""
+KIND, COMPONENT, FIRST, DASH_DIRECTION, SECOND = range(UNIFORMS)
+"""Places of the random numbers."""
 EDGE = 1e-6
 """A number is drawn no nearer than so to the ends of its distribution."""
 _DASH, _TURN, _KICK, _TACKLE = (CLONED.index(name) for name in ("dash", "turn", "kick", "tackle"))
 
 
 @kernel
+def _most(shares: Floats) -> int:
+    best = 0
+    for index in range(len(shares)):
+        if shares[index] > shares[best]:
+            best = index
+    return best
+
+
+@kernel
 def _drawn(shares: Floats, uniform: float) -> int:
     """Return the index that a random number stands for; of shares that do not add up to 1, the last that is not 0."""
+    if uniform < 0:
+        return _most(shares)
     total, last = 0.0, 0
     for index in range(len(shares)):
         if shares[index] > 0:
@@ -49,22 +65,6 @@ def likeliest(made: Answer) -> int:
         if _answered(made, command) and made.probabilities[command] > made.probabilities[best]:
             best = command
     return best
-
-
-@kernel
-def drawn(made: Answer, uniform: float) -> int:
-    """Return the place in the command set of the command that a random number stands for, of those asked for."""
-    whole, command, total = 0.0, 0, 0.0
-    for index in range(len(made.probabilities)):
-        if _answered(made, index):
-            whole += made.probabilities[index]
-    for index in range(len(made.probabilities)):
-        if _answered(made, index) and made.probabilities[index] > 0:
-            total += made.probabilities[index]
-            command = index
-            if uniform * whole < total:
-                break
-    return command
 
 
 @kernel
@@ -100,47 +100,21 @@ def _direction(shares: Floats, which: float, within: float) -> float:
 
 
 @kernel
-def _most(shares: Floats) -> int:
-    best = 0
-    for index in range(len(shares)):
-        if shares[index] > shares[best]:
-            best = index
-    return best
-
-
-@kernel
-def _component(shares: Floats, uniform: float) -> int:
-    """Return the component that a random number stands for; of a negative number the one with the greatest share."""
-    return _most(shares) if uniform < 0 else _drawn(shares, uniform)
-
-
-@kernel
-def centre_of(spec: Ints, made: Answer, command: int, uniform: float, numbers: Array) -> None:
-    """Fill (2,) the numbers of a command by the centre of one component, which both numbers share.
-
-    The single best number may lie between what is done in one case and in another; nobody ever does that.
-
-    Args:
-        uniform: which component, see `_component`.
-    """
-    point_of(spec, made, command, numbers)
-    if spec[MIXTURE] == 0:
-        return
-    if command == _DASH:
-        at = _component(made.dash_power.share, uniform)
-        numbers[0] = clamp(float(made.dash_power.centre[at]), 0.0, 100.0)
-    elif command == _TURN:
-        at = _component(made.turn.share, uniform)
-        angle = wrap(float(made.turn.centre[at])) / DEGREE
-        numbers[0] = clamp(angle * float(made.turn_factor[0]), -180.0, 180.0)
-    elif command == _KICK:
-        at = _component(made.kick_power.share, uniform)
-        numbers[0] = clamp(float(made.kick_power.centre[at]), 0.0, 100.0)
-        numbers[1] = wrap(float(made.kick_direction.centre[at])) / DEGREE
-    elif command == spec[MOVE]:
-        at = _component(made.move_x.share, uniform)
-        numbers[0] = clamp(float(made.move_x.centre[at]), -pitch.MAX_X, pitch.MAX_X)
-        numbers[1] = clamp(float(made.move_y.centre[at]), -pitch.MAX_Y, pitch.MAX_Y)
+def _kind_of(made: Answer, uniform: float) -> int:
+    """Return the place in the command set of the command that a random number stands for, of those asked for."""
+    if uniform < 0:
+        return likeliest(made)
+    whole, command, total = 0.0, 0, 0.0
+    for index in range(len(made.probabilities)):
+        if _answered(made, index):
+            whole += made.probabilities[index]
+    for index in range(len(made.probabilities)):
+        if _answered(made, index) and made.probabilities[index] > 0:
+            total += made.probabilities[index]
+            command = index
+            if uniform * whole < total:
+                break
+    return command
 
 
 @kernel
@@ -154,37 +128,39 @@ def sample(spec: Ints, out: Floats, uniforms: Array, numbers: Array) -> int:
             for those that the command lacks.
     """
     made = view(spec, out)
-    command = drawn(made, uniforms[0])
+    command = _kind_of(made, uniforms[KIND])
     if spec[MIXTURE] == 0:
         point_of(spec, made, command, numbers)
         return command
     numbers[0], numbers[1] = 0.0, 0.0
     if command == _DASH:
-        at = _drawn(made.dash_power.share, uniforms[1])
+        at = _drawn(made.dash_power.share, uniforms[COMPONENT])
         centre, scale = float(made.dash_power.centre[at]), float(made.dash_power.scale[at])
-        numbers[0] = _value(centre, scale, uniforms[2], 0.0, 100.0)
-        numbers[1] = _direction(made.dash_direction, uniforms[3], uniforms[4])
+        numbers[0] = _value(centre, scale, uniforms[FIRST], 0.0, 100.0)
+        numbers[1] = _direction(made.dash_direction, uniforms[DASH_DIRECTION], uniforms[SECOND])
     elif command == _TURN:
-        at = _drawn(made.turn.share, uniforms[1])
-        angle = _angle(float(made.turn.centre[at]), float(made.turn.scale[at]), uniforms[2])
+        at = _drawn(made.turn.share, uniforms[COMPONENT])
+        angle = _angle(float(made.turn.centre[at]), float(made.turn.scale[at]), uniforms[FIRST])
         numbers[0] = clamp(angle * float(made.turn_factor[0]), -180.0, 180.0)
     elif command == _KICK:
-        at = _drawn(made.kick_power.share, uniforms[1])
+        at = _drawn(made.kick_power.share, uniforms[COMPONENT])
         centre, scale = float(made.kick_power.centre[at]), float(made.kick_power.scale[at])
-        numbers[0] = _value(centre, scale, uniforms[2], 0.0, 100.0)
-        numbers[1] = _angle(float(made.kick_direction.centre[at]), float(made.kick_direction.scale[at]), uniforms[4])
+        numbers[0] = _value(centre, scale, uniforms[FIRST], 0.0, 100.0)
+        numbers[1] = _angle(
+            float(made.kick_direction.centre[at]), float(made.kick_direction.scale[at]), uniforms[SECOND]
+        )
     elif command == _TACKLE:
-        numbers[0] = _direction(made.tackle, uniforms[1], uniforms[4])
+        numbers[0] = _direction(made.tackle, uniforms[COMPONENT], uniforms[SECOND])
     elif command == spec[CATCH]:
-        numbers[0] = _direction(made.catch, uniforms[1], uniforms[4])
+        numbers[0] = _direction(made.catch, uniforms[COMPONENT], uniforms[SECOND])
     elif command == spec[MOVE]:
-        at = _drawn(made.move_x.share, uniforms[1])
+        at = _drawn(made.move_x.share, uniforms[COMPONENT])
         x, y, x_scale, y_scale = (
             made.move_x.centre[at],
             made.move_y.centre[at],
             made.move_x.scale[at],
             made.move_y.scale[at],
         )
-        numbers[0] = _value(float(x), float(x_scale), uniforms[2], -pitch.MAX_X, pitch.MAX_X)
-        numbers[1] = _value(float(y), float(y_scale), uniforms[4], -pitch.MAX_Y, pitch.MAX_Y)
+        numbers[0] = _value(float(x), float(x_scale), uniforms[FIRST], -pitch.MAX_X, pitch.MAX_X)
+        numbers[1] = _value(float(y), float(y_scale), uniforms[SECOND], -pitch.MAX_Y, pitch.MAX_Y)
     return command

@@ -11,7 +11,7 @@ from teamclone import planner
 from teamclone.engine import network
 from teamclone.engine.inputs import layout
 from teamclone.engine.network.answer import answer
-from teamclone.engine.network.draw import UNIFORMS, centre_of, drawn, likeliest, sample
+from teamclone.engine.network.draw import UNIFORMS, likeliest, sample
 from teamclone.engine.network.result import Answer, view
 from teamclone.engine.network.spec import INPUTS, N_OUT, Floats, Ints
 from teamclone.engine.network.weights import Weights
@@ -21,8 +21,8 @@ from teamclone.system import compiling
 from teamclone.system.compiling import cached_kernel, tell_when_compiled, version_of
 
 
-def _compiled() -> tuple[Any, Any, Any]:
-    """Return kernels that answer many inputs, draw commands with their numbers, and choose commands with the best."""
+def _compiled() -> tuple[Any, Any]:
+    """Return kernels that answer many inputs, and that draw commands from many answers."""
     version = version_of(network, layout, planner, commands, pitch, compiling)
 
     @cached_kernel(nogil=True, error_model="numpy")
@@ -37,19 +37,10 @@ def _compiled() -> tuple[Any, Any, Any]:
             drawn[index] = sample(spec, out[index], uniforms[index], numbers[index])
         return version
 
-    @cached_kernel(nogil=True, error_model="numpy")
-    def choose_all(spec: Ints, out: Floats, uniforms: Array, chosen: Ints, numbers: Array) -> int:
-        for index in range(len(out)):
-            made = view(spec, out[index])
-            command, component = uniforms[index, 0], uniforms[index, 1]
-            chosen[index] = likeliest(made) if command < 0 else drawn(made, command)
-            centre_of(spec, made, chosen[index], component, numbers[index])
-        return version
-
-    return answer_all, sample_all, choose_all
+    return answer_all, sample_all
 
 
-_answer_all, _sample_all, _choose_all = _compiled()
+_answer_all, _sample_all = _compiled()
 tell_when_compiled({_answer_all: "compiling the layers of networks, once (some seconds)"})
 
 
@@ -120,7 +111,7 @@ class Network:
         """Return a command drawn from the last answer, and its two numbers, 0 for those that it lacks.
 
         Args:
-            uniforms: (UNIFORMS,) random numbers in [0, 1).
+            uniforms: (UNIFORMS,) random numbers, see there.
         """
         self._uniforms[0] = uniforms
         _sample_all(self.weights.spec, self._out, self._uniforms, self._drawn, self._numbers)
@@ -131,25 +122,8 @@ class Network:
         """Return (n,) commands drawn from answers, their places in ``commands``, and (n, 2) their numbers.
 
         Args:
-            answers: (n, N_OUT) as from `answers`. uniforms: (n, UNIFORMS) random numbers in [0, 1).
+            answers: (n, N_OUT) as from `answers`. uniforms: (n, UNIFORMS) random numbers, see there.
         """
         drawn, numbers = np.zeros(len(answers), np.int64), np.zeros((len(answers), 2))
         _sample_all(self.weights.spec, answers, np.ascontiguousarray(uniforms, np.float64), drawn, numbers)
         return drawn, numbers
-
-    def choices(self, answers: Floats, uniforms: Array) -> tuple[Ints, Array]:
-        """Return (n,) a command of each answer, of those that were asked for, and (n, 2) its numbers, without noise.
-
-        The numbers are the centre of one component, so that both belong together.
-
-        Args:
-            answers: (n, N_OUT) as from `answers`.
-            uniforms: (n, 2) random numbers in [0, 1) by which the command and then the component are drawn; a negative
-                one stands for the most probable.
-
-        Returns:
-            As `samples`.
-        """
-        chosen, numbers = np.zeros(len(answers), np.int64), np.zeros((len(answers), 2))
-        _choose_all(self.weights.spec, answers, np.ascontiguousarray(uniforms, np.float64), chosen, numbers)
-        return chosen, numbers

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from teamclone.errors import UsageError
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.prediction_table import PredictionTable, predict_match
-from teamclone.events.definitions import COLUMNS
 from teamclone.events.table import MatchEvents
 from teamclone.logs import Match, read_match
-from teamclone.store.schema import MATCH_EVENTS
+from teamclone.store.events import read_events
 from teamclone.training.run import Run, open_run
 
 if TYPE_CHECKING:
@@ -113,12 +112,11 @@ def match_events(match: Match | Path | str, *, store: Store | None = None) -> Ma
     if store is None:
         return MatchEvents.of(match if isinstance(match, Match) else read_match(match))
     row = MatchColumns.row_of(store, _id(match))
-    found = store.read_match_columns(row["match_id"], MATCH_EVENTS.name, columns=[one.name for one in COLUMNS])
     return MatchEvents(
         match_id=row["match_id"],
         left=row["left_name"],
         right=row["right_name"],
-        columns={one.name: found[one.name].astype("U" if one.dtype == "string" else one.dtype) for one in COLUMNS},
+        columns=read_events(store, row["match_id"]),
     )
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.events import definitions
 from teamclone.events.statistics import described, team_statistics
 from teamclone.logs.align import plays_on
 from teamclone.logs.columns import Source, counter_name
@@ -20,6 +19,7 @@ from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_TEAM, TEAM_SLOTS
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.store import schema
+from teamclone.store.events import read_events
 from teamclone.store.store import Store
 from teamclone.world.channels import FLAG_CHARGED, FLAG_GOALIE, FLAG_ON_FIELD, FLAG_TACKLING
 from teamclone.world.view import FRAME_COLUMNS, PLAYER_COLUMNS, view_columns
@@ -149,15 +149,7 @@ def profile(store: Store, row: Mapping[str, Any], *, side: int) -> Profile:
 
 
 def _of_events(store: Store, match_id: str, side: int) -> dict[str, float]:
-    found = store.read_match_columns(
-        match_id, schema.MATCH_EVENTS.name, columns=[one.name for one in definitions.COLUMNS]
-    )
-    both = team_statistics(
-        {
-            one.name: found[one.name].astype("U") if one.dtype == "string" else found[one.name]
-            for one in definitions.COLUMNS
-        }
-    )
+    both = team_statistics(read_events(store, match_id))
     ours, theirs = (both.left, both.right) if side > 0 else (both.right, both.left)
     return {
         **{name: float(getattr(ours, name)) for name, _, _ in described()},
@@ -217,12 +209,7 @@ def _shares(world: World, goes_on: NDArray[np.bool_]) -> dict[str, float]:
 
 def _stamina(world: World, params: Mapping[str, float | str]) -> dict[str, float]:
     """Return the stamina of field players as the halves end."""
-    half, step = (
-        np.float64(server_params.number(params, name, version=server_params.OLDEST))
-        for name in ("half_time", "simulator_step")
-    )
-    with np.errstate(all="ignore"):
-        cycles = half * 1000.0 / step
+    cycles = server_params.half_cycles(params, version=server_params.OLDEST)
     play_on = world.mode == PlayMode.PLAY_ON
     there = _field_players(world)
     values = {}

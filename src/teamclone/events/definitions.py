@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 
-from teamclone.logs.columns import Column
+from teamclone.logs.columns import column
+from teamclone.logs.match import Columns
 
 
 class EventKind(StrEnum):
@@ -202,32 +203,33 @@ OUTCOMES: Mapping[EventKind, tuple[Outcome, ...]] = {
 """The outcomes of kinds that have some."""
 
 
-def _column(name: str, dtype: str, unit: str, about: str) -> Column:
-    return Column(name=name, dtype=dtype, unit=unit, about=about)
-
-
 COLUMNS = (
-    _column("kind", "string", "", "what it is: `pass`"),
-    _column("outcome", "string", "", "what became of it: `completed`; empty where the kind has none"),
-    _column(
-        "frame", "int32", "", "index of the frame with which it begins; of a touch the one on which it was decided"
-    ),
-    _column("cycle", "int32", "cycle", "server time of `frame`"),
-    _column("stoppage", "int32", "cycle", "stoppage counter of `frame`"),
-    _column("playmode", "uint8", "", "play mode of `frame`, see the playmodes table"),
-    _column(
+    column("kind", "string", "", "what it is: `pass`"),
+    column("outcome", "string", "", "what became of it: `completed`; empty where the kind has none"),
+    column("frame", "int32", "", "index of the frame with which it begins; of a touch the one on which it was decided"),
+    column("cycle", "int32", "cycle", "server time of `frame`"),
+    column("stoppage", "int32", "cycle", "stoppage counter of `frame`"),
+    column("playmode", "uint8", "", "play mode of `frame`, see the playmodes table"),
+    column(
         "end_frame", "int32", "", "index of the frame with which it ends: that of the next touch, of the stop of play"
     ),
-    _column("end_cycle", "int32", "cycle", "server time of `end_frame`"),
-    _column("side", "int8", "", "side of the team whose event it is: 1 left, -1 right, 0 of none"),
-    _column("unum", "uint8", "", "number of its player; 0 of none, of several, or not known"),
-    _column("other_side", "int8", "", "side of the other player that it is about; 0 of none"),
-    _column("other_unum", "uint8", "", "number of the one who received, took or lost the ball; 0 of none or several"),
-    _column("x", "float32", "m", "ball position of `frame`"),
-    _column("y", "float32", "m", "ball position of `frame`"),
-    _column("end_x", "float32", "m", "ball position of `end_frame`"),
-    _column("end_y", "float32", "m", "ball position of `end_frame`"),
-    _column("length", "float32", "m", "distance of the two places"),
-    _column("speed", "float32", "m/cycle", "way of the ball in the cycle after `frame`; NaN where no touch begins it"),
+    column("end_cycle", "int32", "cycle", "server time of `end_frame`"),
+    column("side", "int8", "", "side of the team whose event it is: 1 left, -1 right, 0 of none"),
+    column("unum", "uint8", "", "number of its player; 0 of none, of several, or not known"),
+    column("other_side", "int8", "", "side of the other player that it is about; 0 of none"),
+    column("other_unum", "uint8", "", "number of the one who received, took or lost the ball; 0 of none or several"),
+    column("x", "float32", "m", "ball position of `frame`"),
+    column("y", "float32", "m", "ball position of `frame`"),
+    column("end_x", "float32", "m", "ball position of `end_frame`"),
+    column("end_y", "float32", "m", "ball position of `end_frame`"),
+    column("length", "float32", "m", "distance of the two places"),
+    column("speed", "float32", "m/cycle", "way of the ball in the cycle after `frame`; NaN where no touch begins it"),
 )
 """One value an event: shape (n_events,). ``find.find_events`` makes them."""
+
+
+def typed(columns: Columns) -> Columns:
+    """Return COLUMNS, (n_events,) each, with their types; texts as NumPy text arrays."""
+    return {
+        one.name: columns[one.name].astype("U" if one.dtype == "string" else one.dtype, copy=False) for one in COLUMNS
+    }

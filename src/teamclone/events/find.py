@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from teamclone.events import own, possession, referee, transfers
-from teamclone.events.definitions import COLUMNS, EventKind
+from teamclone.events.definitions import COLUMNS, EventKind, typed
 from teamclone.events.found import Found
 from teamclone.events.touches import Play
 from teamclone.logs.match import Columns
@@ -24,9 +24,7 @@ def find_events(frames: Columns, players: Columns, params: Mapping[str, float | 
         ``definitions.COLUMNS``, (n_events,) each; texts are NumPy text arrays.
     """
     if not len(frames["cycle"]):
-        return {
-            column.name: np.empty(0, "U1" if column.dtype == "string" else np.dtype(column.dtype)) for column in COLUMNS
-        }
+        return typed({column.name: np.empty(0) for column in COLUMNS})
     # Logs may hold any number as a place; what follows from one that is none is none.
     with np.errstate(all="ignore"):
         play = Play.of(frames, players, params)
@@ -78,7 +76,4 @@ def _table(play: Play, found: Sequence[Found]) -> Columns:
         "speed": np.where(touched, np.hypot(*play.step[frame].T), np.nan),
     }
     sort = np.lexsort((rank, frame))
-    return {
-        column.name: made[column.name][sort].astype("U" if column.dtype == "string" else column.dtype)
-        for column in COLUMNS
-    }
+    return typed({name: values[sort] for name, values in made.items()})

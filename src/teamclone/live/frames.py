@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.logs.assemble import player_type_columns
 from teamclone.logs.columns import counter_name
 from teamclone.protocol.agent import CHARGED, KICKED, MEASURED, TACKLES, FullState, Sense
+from teamclone.protocol.parameters import Parameters
 from teamclone.rcss import state_bits
 from teamclone.rcss.commands import BODY_KINDS, CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
@@ -31,7 +31,7 @@ class LiveWorld:
 
     Args:
         side: of the team, 1 left, -1 right.
-        params: the server's parameters. types: parameters of player types by their number.
+        parameters: of the match.
         history: how many cycles before the present a model reads.
     """
 
@@ -39,11 +39,10 @@ class LiveWorld:
         self,
         *,
         side: int,
-        params: Mapping[str, float | str],
-        types: Mapping[int, Mapping[str, float]],
+        parameters: Parameters,
         history: int,
     ) -> None:
-        self._side, self._params, self._types = side, params, player_type_columns(types)
+        self._side, self._params, self._types = side, parameters.server, parameters.type_columns
         # The last command of a frame follows from the counters of the one before.
         self._rows: deque[tuple[dict[str, Any], dict[str, NDArray[Any]]]] = deque(maxlen=history + 2)
         self._counts = np.zeros((len(BODY_KINDS), N_PLAYERS), np.int32)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from teamclone.logs.assemble import player_type_columns
+from teamclone.logs.match import Columns
 from teamclone.protocol import agent
 from teamclone.protocol.agent_client import AgentClient
 from teamclone.rcss.player_types import FIELDS
@@ -51,11 +49,11 @@ class TypesByCoach:
         """True once all players have their types, or the server wants no coach of this team."""
         return bool(self.refusal) or self._left == {}
 
-    def work(self, types: Mapping[int, Mapping[str, float]], *, whole: bool) -> None:
+    def work(self, types: Columns, *, whole: bool) -> None:
         """Go on with the work, as far as the server's answers allow; never waits.
 
         Args:
-            types: parameters of the player types of the match by number.
+            types: the columns of ``player_types.FIELDS``, (n_types,), of the match.
             whole: whether all players are there, so that each can be given a type.
         """
         for datagram in self._client.receive():
@@ -75,7 +73,7 @@ class TypesByCoach:
             self._client.send(agent.init(self._team, self._version))
             return
         if self._left is None:
-            chosen = self._line_up.types(_rows(types))
+            chosen = self._line_up.types(np.stack([types[name] for name in FIELDS], axis=1))
             self._left = dict(enumerate(chosen.tolist(), 1))
         # All begin with type 0, so whoever keeps it comes last.
         for unum, kind in sorted(self._left.items(), key=lambda item: item[1] == 0):
@@ -84,9 +82,3 @@ class TypesByCoach:
     def close(self) -> None:
         """Say bye to the server."""
         self._client.close()
-
-
-def _rows(types: Mapping[int, Mapping[str, float]]) -> NDArray[np.float64]:
-    columns = player_type_columns(types)
-    rows: NDArray[np.float64] = np.stack([columns[name] for name in FIELDS], axis=1).astype(np.float64)
-    return rows

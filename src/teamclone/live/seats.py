@@ -12,6 +12,7 @@ from teamclone.errors import LiveError
 from teamclone.protocol import agent
 from teamclone.protocol.agent import FullState, Sense, Welcome
 from teamclone.protocol.agent_client import AgentClient
+from teamclone.protocol.parameters import Parameters
 from teamclone.rcss.players import N_TEAM
 
 _KNOCK_S = 0.5
@@ -54,7 +55,7 @@ class Seats:
         name: the team's name there. goalkeeper: number of the goalkeeper, 0 for none. host, port: of the server.
 
     Attributes:
-        params, types: the server's parameters, and those of player types by number, as far as they have come.
+        parameters: of the match, as far as they have come.
         side: 1 left, -1 right, 0 before the server has said it.
         heard_at: when the last datagram came, seconds of ``time.monotonic``.
         returned: players that have come back.
@@ -64,8 +65,7 @@ class Seats:
         self._name, self._goalkeeper, self._host, self._port = name, goalkeeper, host, port
         self._versions, self._seats = list(agent.VERSIONS), list[Seat]()
         self._expected = frozenset(range(1, N_TEAM + 1))
-        self.params: dict[str, float | str] = {}
-        self.types: dict[int, dict[str, float]] = {}
+        self.parameters = Parameters()
         self.side = self.returned = 0
         self.heard_at = self._due_since = time.monotonic()
 
@@ -82,7 +82,7 @@ class Seats:
     @property
     def synch(self) -> bool:
         """Whether the server waits for its clients in every cycle."""
-        return bool(self.params.get("synch_mode"))
+        return bool(self.parameters.server.get("synch_mode"))
 
     @property
     def joined(self) -> list[Seat]:
@@ -126,10 +126,7 @@ class Seats:
                 seat.client.send(agent.commands([agent.DONE]))
 
     def _client(self) -> AgentClient:
-        try:
-            return AgentClient(self._host, self._port, lambda data: agent.welcome_of(data) is not None)
-        except OSError as error:
-            raise LiveError(f"{self._host}: no such host ({error.strerror or error}); name another --host") from None
+        return AgentClient(self._host, self._port, lambda data: agent.welcome_of(data) is not None)
 
     def read(self, wait_s: float) -> None:
         """Read what has come, waiting for it at most so many seconds."""
@@ -150,11 +147,8 @@ class Seats:
             seat.thinks = True
         elif (welcome := agent.welcome_of(datagram)) is not None:
             self._welcome(seat, welcome)
-        elif datagram.startswith(b"(player_type "):
-            described = agent.player_type_of(datagram)
-            self.types |= dict([described] if described else [])
-        elif datagram.startswith(b"(server_param "):
-            self.params = agent.server_params_of(datagram) or self.params
+        elif self.parameters.take(agent.text_of(datagram)):
+            pass
         elif (refusal := agent.refusal_of(datagram)) is not None and not seat.client.welcomed:
             self._refused(seat, refusal)
 

@@ -20,7 +20,7 @@ from teamclone.live.line_up import TypesByCoach, kicks_off
 from teamclone.live.seats import Seats
 from teamclone.protocol import agent
 from teamclone.protocol.agent import MEASURED, FullState, Sense
-from teamclone.protocol.client import LOOPBACK
+from teamclone.protocol.udp import LOOPBACK
 from teamclone.rcss import server_params
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.players import N_TEAM
@@ -40,8 +40,6 @@ _MOVE_AGAIN = 5
 """Cycles between two moves to a place: the server executes one in the next step."""
 _LEAST_TURN_NECK = 1.0
 """Degrees."""
-_MOST_NECK = 90.0
-"""Degrees that a neck turns from the body to either side."""
 _X, _Y, _BODY, _NECK = (MEASURED.index(name) for name in ("x", "y", "body", "neck"))
 _TURN_ZERO = Order(CommandKind.TURN, (0.0,))
 """What a player does that has nothing to do: no cycle is without a command."""
@@ -156,8 +154,8 @@ class Team:
                 self._line_up, team=self._name, host=self._host, port=self._coach_port, version=seats.version
             )
         if not self._coach.done:
-            whole = len(seats.joined) == N_TEAM and len(seats.types) >= N_TEAM
-            self._coach.work(seats.types, whole=whole)
+            whole = len(seats.joined) == N_TEAM and len(seats.parameters.types) >= N_TEAM
+            self._coach.work(seats.parameters.type_columns, whole=whole)
         self.summary.types = self._coach.done and not self._coach.refusal
 
     def _answer(self) -> None:
@@ -202,9 +200,9 @@ class Team:
         """Return the body commands of a cycle by the numbers of the players."""
         seats = self._seats
         if self._world is None:
-            if not seats.params or not seats.types:
+            if not seats.parameters.server or not seats.parameters.types:
                 return {}
-            self._world = LiveWorld(side=seats.side, params=seats.params, types=seats.types, history=HISTORY)
+            self._world = LiveWorld(side=seats.side, parameters=seats.parameters, history=HISTORY)
         world, situation = self._world.add(state, senses), SITUATION[state.playmode]
         if situation == Situation.OTHER:
             return {}
@@ -221,7 +219,8 @@ class Team:
 
     def _to_places(self, state: FullState, world: World, unums: Sequence[int]) -> dict[int, Order]:
         """Return what players do that line up for a kick-off: a move to their place, or nothing once they are there."""
-        own = kicks_off(state.playmode, cycle=state.cycle, side=self._seats.side, half_cycles=self._half_cycles())
+        half = server_params.half_cycles(self._seats.parameters.server)
+        own = kicks_off(state.playmode, cycle=state.cycle, side=self._seats.side, half_cycles=half)
         places = self._line_up.own_kick_off if own else self._line_up.other_kick_off
         now, orders = self.summary.cycles, {}
         for unum in unums:
@@ -232,13 +231,6 @@ class Team:
                 self._moved_at[unum] = now
                 orders[unum] = Order(CommandKind.MOVE, (x, y))
         return orders
-
-    def _half_cycles(self) -> float:
-        """Return the cycles of half a match."""
-        half_time_s, step_ms = (
-            server_params.number(self._seats.params, name) for name in ("half_time", "simulator_step")
-        )
-        return 1000 * half_time_s / step_ms
 
     def _there(self, state: FullState) -> list[int]:
         """Return the numbers of the own players on the field."""
@@ -251,5 +243,8 @@ class Team:
         """Return the moment that turns a player's neck to the ball, as far as it can; 0 for none."""
         x, y, body, neck = state.measured[[_X, _Y, _BODY, _NECK], self._slot(unum)].tolist()
         towards = math.degrees(math.atan2(state.ball[1] - y, state.ball[0] - x))
-        moment = min(max(math.remainder(towards - body, 360.0), -_MOST_NECK), _MOST_NECK) - neck
+        least, most = (
+            server_params.number(self._seats.parameters.server, name) for name in ("minneckang", "maxneckang")
+        )
+        moment = min(max(math.remainder(towards - body, 360.0), least), most) - neck
         return moment if abs(moment) > _LEAST_TURN_NECK else 0.0

@@ -24,9 +24,9 @@ from teamclone.live.watch_save import RcgWriter
 from teamclone.live.watch_score import Done, Moment, Score, calibration_error, done_on, parameter_errors
 from teamclone.models.packing import pack
 from teamclone.protocol import monitor
-from teamclone.protocol.client import LOOPBACK
 from teamclone.protocol.monitor import Show
 from teamclone.protocol.monitor_stream import Frame, Message, MonitorStream
+from teamclone.protocol.udp import LOOPBACK
 from teamclone.rcss.commands import CommandKind, parameters_of
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from teamclone.errors import LiveError, UsageError
 from teamclone.live.asking import ask
 from teamclone.live.watch_frames import Seen
 from teamclone.logs.match import Columns
-from teamclone.protocol.monitor_stream import Parameters
+from teamclone.protocol.parameters import Parameters
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
 from teamclone.world.channels import CHANNEL

@@ -10,7 +10,8 @@ from pathlib import Path
 from teamclone.errors import LiveError
 from teamclone.live.watch_frames import known_mode
 from teamclone.protocol.monitor import Show
-from teamclone.protocol.monitor_stream import Frame, Parameters
+from teamclone.protocol.monitor_stream import Frame
+from teamclone.protocol.parameters import Parameters
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.system.documents import write_errors
 

@@ -18,24 +18,25 @@ class Column:
     about: str
 
 
-def _column(name: str, dtype: str, unit: str, about: str) -> Column:
+def column(name: str, dtype: str, unit: str, about: str) -> Column:
+    """Return a column, for tables of them."""
     return Column(name=name, dtype=dtype, unit=unit, about=about)
 
 
 FRAMES = (
-    _column("cycle", "int32", "cycle", "server time of the frame; repeats while the clock is stopped"),
-    _column("stoppage", "int32", "cycle", "frames since the clock stopped; 0 while it runs"),
-    _column("playmode", "uint8", "", "play mode id, see the playmodes table"),
-    _column("left_score", "int16", "", "goals of the left team"),
-    _column("right_score", "int16", "", "goals of the right team"),
-    _column("left_penalties_scored", "int16", "", "penalties scored by the left team in the shoot-out"),
-    _column("left_penalties_missed", "int16", "", "penalties missed by the left team in the shoot-out"),
-    _column("right_penalties_scored", "int16", "", "penalties scored by the right team in the shoot-out"),
-    _column("right_penalties_missed", "int16", "", "penalties missed by the right team in the shoot-out"),
-    _column("ball_x", "float32", "m", "ball position, +x towards the goal that the left team attacks"),
-    _column("ball_y", "float32", "m", "ball position, +y downwards on a monitor"),
-    _column("ball_vx", "float32", "m/cycle", "ball velocity after decay; NaN in log versions 1 and 2"),
-    _column("ball_vy", "float32", "m/cycle", "ball velocity after decay; NaN in log versions 1 and 2"),
+    column("cycle", "int32", "cycle", "server time of the frame; repeats while the clock is stopped"),
+    column("stoppage", "int32", "cycle", "frames since the clock stopped; 0 while it runs"),
+    column("playmode", "uint8", "", "play mode id, see the playmodes table"),
+    column("left_score", "int16", "", "goals of the left team"),
+    column("right_score", "int16", "", "goals of the right team"),
+    column("left_penalties_scored", "int16", "", "penalties scored by the left team in the shoot-out"),
+    column("left_penalties_missed", "int16", "", "penalties missed by the left team in the shoot-out"),
+    column("right_penalties_scored", "int16", "", "penalties scored by the right team in the shoot-out"),
+    column("right_penalties_missed", "int16", "", "penalties missed by the right team in the shoot-out"),
+    column("ball_x", "float32", "m", "ball position, +x towards the goal that the left team attacks"),
+    column("ball_y", "float32", "m", "ball position, +y downwards on a monitor"),
+    column("ball_vx", "float32", "m/cycle", "ball velocity after decay; NaN in log versions 1 and 2"),
+    column("ball_vy", "float32", "m/cycle", "ball velocity after decay; NaN in log versions 1 and 2"),
 )
 """One value a frame: shape (n_frames,)."""
 
@@ -62,30 +63,30 @@ def counter_name(kind: CommandKind) -> str:
 
 
 PLAYERS = (
-    _column("type", "uint8", "", "heterogeneous player type now in use"),
-    _column("state", "uint32", "", "bit mask, see teamclone.rcss.state_bits; 0 when not on the field"),
-    _column("x", "float32", "m", "position"),
-    _column("y", "float32", "m", "position"),
-    _column("vx", "float32", "m/cycle", "velocity after decay; NaN in log versions 1 and 2"),
-    _column("vy", "float32", "m/cycle", "velocity after decay; NaN in log versions 1 and 2"),
-    _column("body", "float32", "deg", "body direction, 0 = +x, positive towards +y"),
-    _column("neck", "float32", "deg", "neck direction relative to the body; NaN in log versions 1 and 2"),
-    _column("pointto_x", "float32", "m", "point the arm points at; NaN while it rests or where the version lacks it"),
-    _column("pointto_y", "float32", "m", "point the arm points at; NaN while it rests or where the version lacks it"),
-    _column("view_quality", "uint8", "", "1 high, 0 low; 255 where the version lacks it"),
-    _column("view_width", "float32", "deg", "opening of the view cone; NaN where the version lacks it"),
-    _column("focus_distance", "float32", "m", "distance of the vision focus point; NaN before text version 6"),
-    _column(
+    column("type", "uint8", "", "heterogeneous player type now in use"),
+    column("state", "uint32", "", "bit mask, see teamclone.rcss.state_bits; 0 when not on the field"),
+    column("x", "float32", "m", "position"),
+    column("y", "float32", "m", "position"),
+    column("vx", "float32", "m/cycle", "velocity after decay; NaN in log versions 1 and 2"),
+    column("vy", "float32", "m/cycle", "velocity after decay; NaN in log versions 1 and 2"),
+    column("body", "float32", "deg", "body direction, 0 = +x, positive towards +y"),
+    column("neck", "float32", "deg", "neck direction relative to the body; NaN in log versions 1 and 2"),
+    column("pointto_x", "float32", "m", "point the arm points at; NaN while it rests or where the version lacks it"),
+    column("pointto_y", "float32", "m", "point the arm points at; NaN while it rests or where the version lacks it"),
+    column("view_quality", "uint8", "", "1 high, 0 low; 255 where the version lacks it"),
+    column("view_width", "float32", "deg", "opening of the view cone; NaN where the version lacks it"),
+    column("focus_distance", "float32", "m", "distance of the vision focus point; NaN before text version 6"),
+    column(
         "focus_direction", "float32", "deg", "direction of the focus point from the neck; NaN before text version 6"
     ),
-    _column("stamina", "float32", "stamina", "stamina after this cycle's recovery; NaN where the version lacks it"),
-    _column("effort", "float32", "", "dash efficiency; NaN where the version lacks it"),
-    _column("recovery", "float32", "", "stamina recovery rate; NaN where the version lacks it"),
-    _column("capacity", "float32", "stamina", "stamina left to recover; NaN before text version 5"),
-    _column("attention_side", "int8", "", "side of the player listened to: 1 left, -1 right, 0 none"),
-    _column("attention_unum", "uint8", "", "number of the player listened to; 0 none"),
+    column("stamina", "float32", "stamina", "stamina after this cycle's recovery; NaN where the version lacks it"),
+    column("effort", "float32", "", "dash efficiency; NaN where the version lacks it"),
+    column("recovery", "float32", "", "stamina recovery rate; NaN where the version lacks it"),
+    column("capacity", "float32", "stamina", "stamina left to recover; NaN before text version 5"),
+    column("attention_side", "int8", "", "side of the player listened to: 1 left, -1 right, 0 none"),
+    column("attention_unum", "uint8", "", "number of the player listened to; 0 none"),
     *(
-        _column(
+        column(
             counter_name(kind),
             "int32",
             "",
@@ -97,30 +98,30 @@ PLAYERS = (
 """One value a frame and player: shape (n_frames, 22), left 1..11 then right 1..11."""
 
 COMMANDS = (
-    _column("frame", "int32", "", "index of the frame the command acts on; -1 where the game log has none"),
-    _column("cycle", "int32", "cycle", "server time at which the command was received"),
-    _column("stoppage", "int32", "cycle", "stoppage counter at which the command was received"),
-    _column("line", "int32", "", "line of the command log, from 1"),
-    _column("order", "int32", "", "place among the commands of its sender in this cycle, from 0"),
-    _column("side", "int8", "", "sender's side: 1 left, -1 right, 0 trainer"),
-    _column("unum", "uint8", "", "sender's number; 0 for a coach or the trainer"),
-    _column("kind", "uint8", "", "command kind id, see the command_kinds table"),
-    _column("legs", "uint8", "", "two-leg dash: 1 left leg, 2 right leg, 3 both; 0 for every other command"),
-    _column(
+    column("frame", "int32", "", "index of the frame the command acts on; -1 where the game log has none"),
+    column("cycle", "int32", "cycle", "server time at which the command was received"),
+    column("stoppage", "int32", "cycle", "stoppage counter at which the command was received"),
+    column("line", "int32", "", "line of the command log, from 1"),
+    column("order", "int32", "", "place among the commands of its sender in this cycle, from 0"),
+    column("side", "int8", "", "sender's side: 1 left, -1 right, 0 trainer"),
+    column("unum", "uint8", "", "sender's number; 0 for a coach or the trainer"),
+    column("kind", "uint8", "", "command kind id, see the command_kinds table"),
+    column("legs", "uint8", "", "two-leg dash: 1 left leg, 2 right leg, 3 both; 0 for every other command"),
+    column(
         "valid", "bool", "", "false where the server's parser refuses it (NaN, unknown word, or after such an error)"
     ),
-    _column("arg0", "float32", "", "first number (power, moment, direction); of a two-leg dash the left leg's power"),
-    _column("arg1", "float32", "", "second number; of a two-leg dash the left leg's direction"),
-    _column("arg2", "float32", "", "third number; of a two-leg dash the right leg's power"),
-    _column("arg3", "float32", "", "fourth number; of a two-leg dash the right leg's direction"),
+    column("arg0", "float32", "", "first number (power, moment, direction); of a two-leg dash the left leg's power"),
+    column("arg1", "float32", "", "second number; of a two-leg dash the left leg's direction"),
+    column("arg2", "float32", "", "third number; of a two-leg dash the right leg's power"),
+    column("arg3", "float32", "", "fourth number; of a two-leg dash the right leg's direction"),
 )
 """One value a received command: shape (n_commands,). The text of a command is ``Match.command_text``."""
 
 INTERVALS = (
-    _column("low0", "float32", "", "of recovered commands the ends of the 90 % interval of `arg0`; else NaN"),
-    _column("high0", "float32", "", "its upper end"),
-    _column("low1", "float32", "", "so too of `arg1`"),
-    _column("high1", "float32", "", "its upper end"),
+    column("low0", "float32", "", "of recovered commands the ends of the 90 % interval of `arg0`; else NaN"),
+    column("high0", "float32", "", "its upper end"),
+    column("low1", "float32", "", "so too of `arg1`"),
+    column("high1", "float32", "", "its upper end"),
 )
 """How well the numbers of a recovered command are known, see `dynamics.inverse`: shape (n_commands,)."""
 
@@ -135,8 +136,8 @@ class Source(IntEnum):
 
 
 EVENTS = (
-    _column("cycle", "int32", "cycle", "server time of the announcement"),
-    _column("stoppage", "int32", "cycle", "stoppage counter of the announcement"),
-    _column("line", "int32", "", "line of the command log, from 1"),
+    column("cycle", "int32", "cycle", "server time of the announcement"),
+    column("stoppage", "int32", "cycle", "stoppage counter of the announcement"),
+    column("line", "int32", "", "line of the command log, from 1"),
 )
 """One value an announcement of the referee: shape (n_events,). Its words are ``Match.event_texts``."""

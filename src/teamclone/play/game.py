@@ -19,8 +19,9 @@ from teamclone.play.processes import MARK, end_all, start
 from teamclone.play.record import FailedError, Fault, who
 from teamclone.play.schedule import Fixture, TeamSpec, filled_in
 from teamclone.play.server import coach_connected, last_words, met_taken_port, server_environment, server_words
-from teamclone.protocol.client import LOOPBACK, MonitorClient
+from teamclone.protocol.client import MonitorClient
 from teamclone.protocol.monitor import Show, load_reader
+from teamclone.protocol.udp import LOOPBACK
 from teamclone.rcss.playmodes import PlayMode
 
 SIDES = ("left", "right")

@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.logs.assemble import checked_type
-from teamclone.logs.rcg_text import parameters
 from teamclone.rcss.commands import BODY_KINDS, CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.playmodes import BY_NAME, PlayMode
@@ -116,7 +114,7 @@ class Sense:
 
 def welcome_of(datagram: bytes) -> Welcome | None:
     """Read the answer to `init` or `reconnect`; None where the datagram is something else."""
-    text = _text(datagram)
+    text = text_of(datagram)
     if found := _INIT.fullmatch(text):
         side, unum, mode = found.groups()
         number = int(unum)
@@ -132,42 +130,25 @@ def _welcome(side: bytes, unum: int, mode: bytes) -> Welcome:
 
 def coach_side_of(datagram: bytes) -> int | None:
     """Read the answer to a coach's `init`: its side, 1 left or -1 right; None where it is something else."""
-    found = _COACH_INIT.fullmatch(_text(datagram))
+    found = _COACH_INIT.fullmatch(text_of(datagram))
     return None if found is None else (1 if found[1] == b"l" else -1)
 
 
 def refusal_of(datagram: bytes) -> str | None:
     """Read the server's words of an ``(error ...)``; None where the datagram is something else."""
-    found = _REFUSED.fullmatch(_text(datagram))
+    found = _REFUSED.fullmatch(text_of(datagram))
     return None if found is None else found[1].decode("ascii", "replace")
 
 
 def changed_type_of(datagram: bytes) -> tuple[int, int] | None:
     """Read number and type of a player whose type the coach has changed; None where it is something else."""
-    found = _CHANGED.fullmatch(_text(datagram))
+    found = _CHANGED.fullmatch(text_of(datagram))
     return None if found is None else (int(found[1]), int(found[2]))
-
-
-def server_params_of(datagram: bytes) -> dict[str, float | str] | None:
-    """Read the server's parameters; None where the datagram is something else."""
-    text = _text(datagram)
-    return parameters(text) if text.startswith(b"(server_param ") and text.endswith(b")") else None
-
-
-def player_type_of(datagram: bytes) -> tuple[int, dict[str, float]] | None:
-    """Read number and parameters of a player type; None where the datagram is something else."""
-    text = _text(datagram)
-    if not text.startswith(b"(player_type "):
-        return None
-    try:
-        return checked_type(parameters(text))
-    except ValueError:
-        return None
 
 
 def full_state_of(datagram: bytes) -> FullState | None:
     """Read a full state; None where the datagram is something else, or damaged."""
-    text = _text(datagram)
+    text = text_of(datagram)
     head = _STATE.match(text)
     if head is None:
         return None
@@ -205,7 +186,7 @@ def full_state_of(datagram: bytes) -> FullState | None:
 
 def sense_of(datagram: bytes) -> Sense | None:
     """Read what a player feels; None where the datagram is something else, or damaged."""
-    text = _text(datagram)
+    text = text_of(datagram)
     head, tackle = _SENSE.match(text), _TACKLE.search(text)
     if head is None or tackle is None or not text.endswith(b")"):
         return None
@@ -231,7 +212,7 @@ def playmode_of(word: bytes) -> int:
 
 def asks_to_think(datagram: bytes) -> bool:
     """Return whether the server waits for the client's commands."""
-    return _text(datagram) == b"(think)"
+    return text_of(datagram) == b"(think)"
 
 
 def init(team: str, version: int, *, goalie: bool = False) -> bytes:
@@ -279,6 +260,6 @@ def _message(text: str) -> bytes:
     return text.encode("ascii") + b"\0"
 
 
-def _text(datagram: bytes) -> bytes:
+def text_of(datagram: bytes) -> bytes:
     """Return the text of a datagram, empty where it is too long to be a message."""
     return datagram.partition(b"\0")[0].rstrip() if len(datagram) <= MAX_BYTES else b""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable
 from contextlib import suppress
 
 from teamclone.protocol.agent import BYE, MAX_BYTES
-from teamclone.protocol.client import LOOPBACK
+from teamclone.protocol.udp import address_of, open_socket
 
 _MOST_DATAGRAMS = 4096
 """Read in one go: more than the socket keeps, and an end to a flood."""
@@ -24,18 +23,17 @@ class AgentClient:
     Args:
         welcomes: whether a datagram is the server's welcome.
 
+    Raises:
+        LiveError: the host has no address.
+
     Attributes:
         welcomed: whether one has come. gone: whether the server no longer listens.
     """
 
     def __init__(self, host: str, port: int, welcomes: Callable[[bytes], bool]) -> None:
         self.welcomed = self.gone = False
-        self._server, self._welcomes = (socket.gethostbyname(host), port), welcomes
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-        self._socket.setblocking(False)
-        if host == LOOPBACK:  # then no other machine reaches this socket
-            self._socket.bind((LOOPBACK, 0))
+        self._server, self._welcomes = (address_of(host), port), welcomes
+        self._socket = open_socket(host, buffer_bytes=_BUFFER)
 
     def fileno(self) -> int:
         """Return the socket's descriptor, for ``select``."""

@@ -5,18 +5,19 @@ In synchronous mode the server pauses for monitors, 20 ms in 32 cycles, so one t
 
 from __future__ import annotations
 
-import socket
 import time
 from contextlib import suppress
 
 from teamclone.protocol import monitor
 from teamclone.protocol.monitor import Show
+from teamclone.protocol.udp import LOOPBACK, address_of, open_socket
 
-LOOPBACK = "127.0.0.1"
 _ASK_S = 0.3
 """Seconds between two requests to a server that does not answer."""
 _SILENT_S = 3.0
 """Seconds after which a server that has answered is asked again."""
+_BUFFER = 1 << 20
+"""Bytes that the socket keeps."""
 _MOST_DATAGRAMS = 512
 """Read in one go: more than the socket keeps, and an end to a flood."""
 
@@ -32,15 +33,11 @@ class MonitorClient:
 
     def __init__(self, port: int, *, host: str = LOOPBACK) -> None:
         self.rest_s = 0.0
-        self._server = (socket.gethostbyname(host), port)
+        self._server = (address_of(host), port)
         self._served_at: tuple[str, int] | None = None  # the server answers each monitor from a port of its own
         self._ask_at = self._heard_at = 0.0
         self._asked = False
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
-        self._socket.setblocking(False)
-        if host == LOOPBACK:  # then no other machine reaches this socket
-            self._socket.bind((LOOPBACK, 0))
+        self._socket = open_socket(host, buffer_bytes=_BUFFER)
 
     def latest(self) -> Show | None:
         """Return the newest cycle that has come since the last call; None where none has. Never waits."""

@@ -14,16 +14,13 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from teamclone.errors import LiveError
-from teamclone.logs.assemble import checked_type, player_type_columns
-from teamclone.logs.match import Columns
-from teamclone.logs.rcg_text import parameters
 from teamclone.protocol import monitor
-from teamclone.protocol.client import LOOPBACK
 from teamclone.protocol.monitor import Show
+from teamclone.protocol.parameters import Parameters
+from teamclone.protocol.udp import LOOPBACK, address_of, open_socket
 
 BUFFER_BYTES = 4 << 20
 """Asked of the system for datagrams that are not read yet: some hundred cycles."""
@@ -65,53 +62,6 @@ class Message(NamedTuple):
     text: bytes
 
 
-@dataclass(slots=True)
-class Parameters:
-    """What a server says of a match before it shows it.
-
-    Attributes:
-        server, player: parameters as `rcg_text.parameters` reads them. types: of each player type by its number.
-        texts: the messages as they came, by the first words of each.
-    """
-
-    server: dict[str, float | str] = field(default_factory=dict)
-    player: dict[str, float | str] = field(default_factory=dict)
-    types: dict[int, dict[str, float]] = field(default_factory=dict)
-    texts: dict[bytes, bytes] = field(default_factory=dict)
-
-    @property
-    def whole(self) -> bool:
-        """Whether all have come: those of the server and of players, and as many types as these say."""
-        n_types = self.player.get("player_types", 1.0)
-        return bool(self.server and self.player) and isinstance(n_types, float) and len(self.types) >= n_types
-
-    @property
-    def type_columns(self) -> Columns:
-        """The columns of ``player_types.FIELDS``, see `GameLog.player_types`."""
-        return player_type_columns(self.types)
-
-    def take(self, text: bytes) -> bool:
-        """Take a message in; return whether it is one of parameters."""
-        word = text.partition(b" ")[0]
-        if b"\n" in text:  # a log could not have it
-            return False
-        if word == b"(server_param":
-            self.server = parameters(text)
-        elif word == b"(player_param":
-            self.player = parameters(text)
-        elif word == b"(player_type":
-            try:
-                number, fields = checked_type(parameters(text))
-            except ValueError:
-                return False
-            self.types[number] = fields
-            word += b" %d" % number
-        else:
-            return False
-        self.texts[word] = text
-        return True
-
-
 class MonitorStream:
     """A connection to a server that shows its match.
 
@@ -125,10 +75,7 @@ class MonitorStream:
     """
 
     def __init__(self, port: int, *, host: str = LOOPBACK) -> None:
-        try:
-            self._server = (socket.gethostbyname(host), port)
-        except OSError as error:
-            raise LiveError(f"{host}: no such host ({error.strerror or error}); name another with --host") from None
+        self._server = (address_of(host), port)
         self.parameters, self.version = Parameters(), _VERSIONS[0]
         self.dropped = 0
         self._served_at: tuple[str, int] | None = None
@@ -137,14 +84,11 @@ class MonitorStream:
         self._ready: deque[Frame | Message] = deque()
         self._asked, self._ask_at, self._without = False, 0.0, 0
         self._waiting: queue.SimpleQueue[Received] = queue.SimpleQueue()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+        self._socket = open_socket(host, buffer_bytes=BUFFER_BYTES)
         self.buffer_bytes = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
         if _STAMPED is not None:
             self._socket.setsockopt(socket.SOL_SOCKET, _STAMPED, 1)
         self._socket.settimeout(0.2)
-        if host == LOOPBACK:  # then no other machine reaches this socket
-            self._socket.bind((LOOPBACK, 0))
         self._closing = threading.Event()
         self._reader = threading.Thread(target=self._read, name="monitor", daemon=True)
         self._reader.start()

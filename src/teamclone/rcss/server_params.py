@@ -147,3 +147,10 @@ def number(params: Mapping[str, float | str], name: str, *, version: int | None 
 def vector(params: Mapping[str, float | str], *, version: int | None = None) -> NDArray[np.float64]:
     """Return (len(FIELDS),) all of FIELDS of a match, each by `number`."""
     return np.array([number(params, name, version=version) for name in FIELDS])
+
+
+def half_cycles(params: Mapping[str, float | str], *, version: int | None = None) -> float:
+    """Return the cycles of half a match; infinite or NaN where the parameters give it no end."""
+    half_s, step_ms = (np.float64(number(params, name, version=version)) for name in ("half_time", "simulator_step"))
+    with np.errstate(all="ignore"):
+        return float(half_s * 1000.0 / step_ms)

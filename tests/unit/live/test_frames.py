@@ -12,6 +12,7 @@ from teamclone.live.frames import LiveWorld
 from teamclone.logs import read_match
 from teamclone.logs.match import Match
 from teamclone.protocol import agent
+from teamclone.protocol.parameters import Parameters
 from teamclone.rcss import state_bits
 from teamclone.rcss.commands import CommandKind
 from teamclone.rcss.player_types import FIELDS
@@ -50,7 +51,8 @@ def test_the_world_is_that_of_the_log(match: Match, side: int) -> None:
         number: {name: float(game.player_types[name][number]) for name in FIELDS}
         for number in range(len(game.player_types["player_decay"]))
     }
-    live = LiveWorld(side=side, params=game.server_params, types=types, history=3)
+    parameters = Parameters(server=dict(game.server_params), types=types)
+    live = LiveWorld(side=side, parameters=parameters, history=3)
     expected, own = view(match, side=side), 0 if side > 0 else N_TEAM
     # A goal sets those on their feet that have just tackled: their bit lasts one frame.
     lies = (game.players["state"] & state_bits.TACKLES) != 0

@@ -9,6 +9,7 @@ from teamclone.live.watch_frames import Seen
 from teamclone.protocol.monitor import show_of
 from teamclone.protocol.monitor_stream import Frame
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.world.view import mode_cycles
 
 GOAL = int(PlayMode.GOAL_L)
 
@@ -44,6 +45,13 @@ def test_where_the_clock_stands_equal_frames_are_different_ones() -> None:
     assert add(seen, 8)
     assert seen.cycle(4) == (8, 0)
     assert seen.counts.doubled == 0
+
+
+def test_the_age_of_a_play_mode_is_that_of_the_log() -> None:
+    seen = Seen()
+    for cycle, pm in ((1, 4), (2, 4), (2, 3), (3, 3), (4, 3), (7, 3), (8, 3), (8, GOAL), (8, GOAL), (9, 3), (9, 3)):
+        if add(seen, cycle, pm=pm):
+            assert seen.mode_cycles == mode_cycles(seen.window(0, len(seen))[0])[-1]
 
 
 def test_doubled_late_and_lost_datagrams_are_counted_and_no_frame_comes_twice() -> None:

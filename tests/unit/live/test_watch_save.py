@@ -14,7 +14,8 @@ from teamclone.live.watch_frames import Seen
 from teamclone.live.watch_save import RcgWriter
 from teamclone.logs import read_match
 from teamclone.protocol.monitor import show_of
-from teamclone.protocol.monitor_stream import Frame, Parameters
+from teamclone.protocol.monitor_stream import Frame
+from teamclone.protocol.parameters import Parameters
 
 
 def parameters(texts: list[bytes]) -> Parameters:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from teamclone.protocol import agent
 from teamclone.protocol.agent import MEASURED, Sense, Welcome
+from teamclone.protocol.parameters import Parameters
 from teamclone.rcss.commands import BODY_KINDS, CommandKind
 from teamclone.rcss.playmodes import PlayMode
 
@@ -81,11 +82,21 @@ def test_answers_of_the_server_are_told_apart() -> None:
 
 
 def test_parameters_are_read() -> None:
-    params = agent.server_params_of(b'(server_param (half_time 300)(synch_mode 1)(landmark_file "~/.x"))\0')
-    assert params == {"half_time": 300.0, "synch_mode": 1.0, "landmark_file": "~/.x"}
-    assert agent.player_type_of(b"(player_type (id 3)(player_decay 0.4))\0") == (3, {"player_decay": 0.4})
-    assert agent.player_type_of(b"(player_type (id 300)(player_decay 0.4))\0") is None
-    assert agent.player_type_of(b"(player_type (id 3)(player_decay nan))\0") is None
+    found = Parameters()
+    for text in (
+        b'(server_param (half_time 300)(synch_mode 1)(landmark_file "~/.x"))',
+        b"(player_param (player_types 18))",
+        b"(player_type (id 3)(player_decay 0.4))",
+    ):
+        assert found.take(text)
+    assert found.server == {"half_time": 300.0, "synch_mode": 1.0, "landmark_file": "~/.x"}
+    for text in (
+        b"(player_type (id 300)(player_decay 0.4))",
+        b"(player_type (id 4)(player_decay nan))",
+        b"(server_param (half_time 200)(synch_m",
+    ):
+        assert not found.take(text)
+    assert found.types == {3: {"player_decay": 0.4}}
 
 
 def test_requests_are_as_the_server_reads_them() -> None:
@@ -105,8 +116,7 @@ READERS = (
     agent.coach_side_of,
     agent.refusal_of,
     agent.changed_type_of,
-    agent.server_params_of,
-    agent.player_type_of,
+    lambda data: Parameters().take(agent.text_of(data)),
     agent.asks_to_think,
 )
 

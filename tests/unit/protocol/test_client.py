@@ -10,29 +10,13 @@ import pytest
 
 from datagrams import WHOLE, packet
 from teamclone.protocol import client
-from teamclone.protocol.client import LOOPBACK, MonitorClient
+from teamclone.protocol.client import MonitorClient
+from teamclone.protocol.udp import LOOPBACK
 
 
 def port_of(opened: socket.socket) -> int:
     port: int = opened.getsockname()[1]
     return port
-
-
-@pytest.fixture
-def sockets() -> Iterator[Callable[[], socket.socket]]:
-    """Makes UDP sockets on this machine."""
-    made: list[socket.socket] = []
-
-    def make() -> socket.socket:
-        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        opened.bind((LOOPBACK, 0))
-        opened.settimeout(5)
-        made.append(opened)
-        return opened
-
-    yield make
-    for opened in made:
-        opened.close()
 
 
 class Served:

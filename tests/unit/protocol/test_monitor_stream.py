@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from datagrams import packet
 from teamclone.errors import LiveError
-from teamclone.protocol.client import LOOPBACK
 from teamclone.protocol.monitor import MAX_BYTES
-from teamclone.protocol.monitor_stream import Frame, Message, MonitorStream, Parameters
+from teamclone.protocol.monitor_stream import Frame, Message, MonitorStream
+from teamclone.protocol.parameters import Parameters
+from teamclone.protocol.udp import LOOPBACK
 
 PARAMETERS = [
     b"(server_param (half_time 300)(ball_decay 0.94))\0",
@@ -22,22 +23,6 @@ PARAMETERS = [
     b"(player_type (id 0)(player_speed_max 1.05))\0",
     b"(player_type (id 1)(player_speed_max 1.1))\0",
 ]
-
-
-@pytest.fixture
-def sockets() -> Iterator[Callable[[], socket.socket]]:
-    made: list[socket.socket] = []
-
-    def make() -> socket.socket:
-        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        opened.bind((LOOPBACK, 0))
-        opened.settimeout(5)
-        made.append(opened)
-        return opened
-
-    yield make
-    for opened in made:
-        opened.close()
 
 
 class Served:

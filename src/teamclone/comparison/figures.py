@@ -8,14 +8,12 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator, PercentFormatter
 
 from teamclone.comparison.profile import ZONES
 from teamclone.comparison.words import label_of, name_of
-from teamclone.plots.page import ACCENT, INK, MUTED, SECOND, STYLE, WIDTH
-from teamclone.plots.pitch import draw_pitch
-from teamclone.rcss import pitch
+from teamclone.plots.maps import draw_zones
+from teamclone.plots.page import ACCENT, COLOURS, INK, MUTED, SECOND, STYLE, WIDTH
 
 _WHOSE = (("original", SECOND, -0.16), ("clone", ACCENT, 0.16))
 _LEAST_UNITS, _MOST_UNITS = 0.1, 100.0
@@ -80,24 +78,14 @@ def places(where: Mapping[str, Any]) -> Figure:
     """Draw the distance of positions in units: by zone of the ball on a pitch, and by player."""
     figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
     field, bars = figure.subplots(1, 2, width_ratios=(1.6, 1))
-    draw_pitch(field, colour=MUTED, width=0.7)
-    size = pitch.LENGTH / ZONES, pitch.WIDTH / ZONES
-    for zone, value in enumerate(_quotients(where["zones"])):
-        along, across = divmod(zone, ZONES)
-        corner = along * size[0] - pitch.HALF_LENGTH, across * size[1] - pitch.HALF_WIDTH
-        shade = 0.0 if np.isnan(value) else float(np.clip((value - 1.0) / 4.0, 0.0, 1.0)) * 0.6
-        field.add_patch(Rectangle(corner, *size, facecolor=ACCENT, alpha=shade, edgecolor="none", zorder=0))
-        field.annotate(
-            "" if np.isnan(value) else f"{value:.1f}",
-            (corner[0] + size[0] / 2, corner[1] + size[1] / 2),
-            ha="center",
-            va="center",
-        )
+    values = np.reshape(_quotients(where["zones"]), (ZONES, ZONES))
+    text = [["" if np.isnan(value) else f"{value:.1f}" for value in row] for row in values]
+    # No colour where the clone is as near as the original's own matches are to each other.
+    draw_zones(field, values, text=text, colours=COLOURS, scale=(1.0, 5.0))
     field.set_title("by zone of the ball, in units")
-    field.set_axis_off()
-    values = _quotients(where["players"])
-    numbers = np.arange(1, len(values) + 1)
-    bars.barh(numbers, values, color=ACCENT, height=0.6)
+    players = _quotients(where["players"])
+    numbers = np.arange(1, len(players) + 1)
+    bars.barh(numbers, players, color=ACCENT, height=0.6)
     bars.axvline(1.0, color=MUTED, linewidth=0.9, linestyle=(0, (3, 3)))
     bars.set_yticks(numbers)
     bars.invert_yaxis()

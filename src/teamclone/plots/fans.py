@@ -23,13 +23,14 @@ def draw_fans(fans: Sequence[Mapping[str, Any]], *, colours: Colours, width: flo
     for axes in grid.flat:
         axes.set_axis_off()
     for axes, fan in zip(grid.flat, fans, strict=False):
-        draw_pitch(axes, colour=colours.rule)
-        _draw(axes, fan, colours)
+        draw_fan(axes, fan, colours=colours)
         axes.set_title(f"cycle {fan['cycle']}, {fan['ahead']} cycles ahead")
     return figure
 
 
-def _draw(axes: Any, fan: Mapping[str, Any], colours: Colours) -> None:
+def draw_fan(axes: Any, fan: Mapping[str, Any], *, colours: Colours) -> None:
+    """Draw a fan into axes that have no pitch yet; see `draw_fans`."""
+    draw_pitch(axes, colour=colours.rule)
     for place in fan["others"]:
         axes.plot(*place, "o", color=colours.muted, markersize=2.2, zorder=4)
     for body in fan["bodies"]:

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from teamclone.plots.style import Colours, style
 
-INK, MUTED, RULE, ACCENT, SECOND = "#010203", "#010204", "#010205", "#010206", "#010207"
-_STAND_INS = {INK: "ink", MUTED: "muted", RULE: "rule", ACCENT: "accent", SECOND: "second"}
+PAPER, INK, MUTED, RULE, ACCENT, SECOND = (f"#01020{n}" for n in range(2, 8))
+_STAND_INS = {PAPER: "paper", INK: "ink", MUTED: "muted", RULE: "rule", ACCENT: "accent", SECOND: "second"}
 KIND_COLOURS = {
     **{"dash": "#3d85c6", "turn": "#dd8a1b", "kick": "#1f9e78", "tackle": "#c75b9b"},
     **{"catch": "#8a6fd1", "move": "#a3862a", "none": "#7d8791"},
@@ -24,7 +24,7 @@ KIND_COLOURS = {
 WIDTH = 7.4
 """Inches; the page scales it to its column."""
 
-COLOURS = Colours(ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND)
+COLOURS = Colours(paper=PAPER, ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND)
 STYLE = style(COLOURS)
 
 

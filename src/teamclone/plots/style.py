@@ -12,10 +12,11 @@ class Colours:
     """Colours of a figure, as matplotlib names them.
 
     Attributes:
-        ink: of titles and text. muted: of axes and their labels. rule: of the grid.
+        paper: of the page. ink: of titles and text. muted: of axes and their labels. rule: of the grid.
         accent, second: of the first and the second curve.
     """
 
+    paper: str
     ink: str
     muted: str
     rule: str
@@ -23,7 +24,7 @@ class Colours:
     second: str
 
 
-LIGHT = Colours(ink="#1c2126", muted="#5d6872", rule="#e2e7ec", accent="#1b6fb3", second="#c46a12")
+LIGHT = Colours(paper="#ffffff", ink="#1c2126", muted="#5d6872", rule="#e2e7ec", accent="#1b6fb3", second="#c46a12")
 """Of a figure that is a file of its own, on white."""
 
 

@@ -24,8 +24,8 @@ DISC = 13.0
 """Diameter of a player, points: two digits fit."""
 LEVELS = 9
 """Of a heat map."""
-SMOOTH_M = 2.5
-"""Standard deviation by which counts of a heat map are spread."""
+LEAST_SMOOTH_M = 1.5
+"""Least standard deviation by which counts of a heat map are spread."""
 STRONGEST = 0.75
 """Opacity of the greatest value: lines and letters above it stay legible."""
 _LEAST_COUNT = 0.05
@@ -40,37 +40,58 @@ def draw_formation(
     axes: Any,
     places: ArrayLike,
     *,
-    unums: Sequence[int],
+    unums: ArrayLike,
     colours: Colours,
     colour: str | None = None,
     spread: ArrayLike | None = None,
     labels: Sequence[str] | None = None,
     ball: ArrayLike | None = None,
 ) -> None:
-    """Draw players as discs with their numbers.
+    """Draw a pitch with players, see `draw_players`, and the ball (2,) m where there is one."""
+    _pitch(axes, colours)
+    draw_players(axes, places, unums=unums, colours=colours, colour=colour, spread=spread, labels=labels)
+    if ball is not None:
+        _ball(axes, ball, colours)
+
+
+def draw_players(
+    axes: Any,
+    places: ArrayLike,
+    *,
+    unums: ArrayLike,
+    colours: Colours,
+    colour: str | None = None,
+    spread: ArrayLike | None = None,
+    labels: Sequence[str] | None = None,
+    body: ArrayLike | None = None,
+) -> None:
+    """Draw players as discs with their numbers, onto a pitch that is there.
 
     Args:
         places: (n, 2) m; players with NaN are left out. unums: (n,) their numbers.
         colour: of the players; None for the accent.
         spread: (n, 2) m, standard deviations along and across the pitch, drawn as ellipses.
-        labels: (n,) words below the discs. ball: (2,) m.
+        labels: (n,) words below the discs.
+        body: (n,) degrees, where they face, drawn as strokes.
     """
     places = np.asarray(places, np.float64)
+    there = np.isfinite(places).all(1)
     colour = colours.accent if colour is None else colour
-    _pitch(axes, colours)
     if spread is not None:
-        for place, deviation in zip(places, np.asarray(spread, np.float64), strict=True):
-            if np.isfinite([*place, *deviation]).all():
-                axes.add_patch(Ellipse(place, *(2 * deviation), facecolor=colour, alpha=0.16, linewidth=0, zorder=2))
-    _discs(axes, places, unums, np.full(len(places), DISC), colour=colour, colours=colours)
-    for place, label in zip(places, labels or (), strict=labels is not None):
-        if np.isfinite(place).all():
-            below = (0, -DISC / 2 - 1)
-            axes.annotate(
-                label, place, below, textcoords="offset points", ha="center", va="top", fontsize=7, color=colours.muted
-            )
-    if ball is not None:
-        _ball(axes, ball, colours)
+        for place, deviation in zip(places[there], np.asarray(spread, np.float64)[there], strict=True):
+            axes.add_patch(Ellipse(place, *(2 * deviation), facecolor=colour, alpha=0.16, linewidth=0, zorder=2))
+    if body is not None:
+        angle = np.radians(np.asarray(body, np.float64)[there])
+        axes.quiver(
+            *places[there].T, np.cos(angle), np.sin(angle), color=colour, headwidth=0, headlength=0, headaxislength=0,
+            angles="xy", units="inches", scale_units="inches", scale=72 / DISC, width=2.5 / 72, zorder=4,
+        )  # fmt: skip
+    sizes = np.full(len(places), DISC)
+    _discs(axes, places, unums, sizes, colour=colour, colours=colours)
+    if labels is not None:
+        look: Any = {"textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7, "color": colours.muted}
+        for place, label in zip(places[there], np.asarray(labels)[there], strict=True):
+            axes.annotate(label, place, (0, -DISC / 2 - 1), zorder=6, **look)
 
 
 def draw_pass_network(
@@ -78,10 +99,10 @@ def draw_pass_network(
     places: ArrayLike,
     counts: ArrayLike,
     *,
-    unums: Sequence[int],
+    unums: ArrayLike,
     colours: Colours,
     colour: str | None = None,
-    least: int | None = None,
+    least: float | None = None,
 ) -> None:
     """Draw passes between players: arrows by how many there were, discs by how many a player made.
 
@@ -89,7 +110,7 @@ def draw_pass_network(
 
     Args:
         places: (n, 2) m; players with NaN are left out, with their passes. unums: (n,) their numbers.
-        counts: (n, n) completed passes from row to column.
+        counts: (n, n) completed passes from row to column, of a match or on average.
         colour: of players and passes; None for the accent.
         least: pairs with fewer are not drawn; None for all.
     """
@@ -102,7 +123,7 @@ def draw_pass_network(
     made = counts.sum(1)
     sizes = DISC * np.sqrt(1.0 + 1.5 * _shares(made))
     shares = _shares(counts)
-    for passer, receiver in _ascending(counts, 1 if least is None else least):
+    for passer, receiver in _ascending(counts, 0.0 if least is None else least):
         share = shares[passer, receiver]
         axes.add_patch(
             _arrow(
@@ -119,19 +140,19 @@ def draw_pass_network(
 
 
 def draw_heat(axes: Any, counts: ArrayLike, *, colours: Colours, colour: str | None = None, lines: bool = True) -> None:
-    """Draw how often something happened where, smoothed, from light to strong.
+    """Draw how often something happened where, smoothed the more the rarer it was, from light to strong.
 
     Args:
-        counts: (nx, ny) over the whole pitch, equal cells, from its corner of least x and y.
+        counts: (nx, ny) over the whole pitch, equal cells of at most 2 m, from its corner of least x and y.
         colour: None for the accent. lines: draw the edges of the levels, too.
     """
     counts = np.asarray(counts, np.float64)
     colour = colours.accent if colour is None else colour
     _pitch(axes, colours)
     size = np.array([pitch.LENGTH, pitch.WIDTH]) / counts.shape
-    smooth = _smoothed(counts, SMOOTH_M / size)
-    if not smooth.max() > 0:
+    if not counts.sum() > 0:
         return
+    smooth = _smoothed(counts, np.maximum(_bandwidth(counts), LEAST_SMOOTH_M / size))
     # Up to the lines of the pitch, as contours end at the middle of the outermost cells.
     smooth = np.pad(smooth, 1, mode="edge")
     x, y = (
@@ -151,7 +172,7 @@ def draw_shots(
     x: ArrayLike,
     y: ArrayLike,
     *,
-    outcome: Sequence[str],
+    outcome: ArrayLike,
     colours: Colours,
     size: ArrayLike | None = None,
     colour: str | None = None,
@@ -160,7 +181,7 @@ def draw_shots(
     """Draw shots as circles, goals filled, and how many there are of both.
 
     Args:
-        x, y: (n,) m. outcome: (n,) words, ``goal`` of a goal.
+        x, y: (n,) m. outcome: (n,) bool, whether it was a goal.
         size: (n,) areas, such as expected goals; None for 1.
         colour: None for the accent.
         half: leave out the own half, as far as there is no shot in it.
@@ -168,7 +189,7 @@ def draw_shots(
     x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
     area = _SHOT * np.maximum(np.ones(len(x)) if size is None else np.asarray(size, np.float64), _LEAST_SHOT)
     colour = colours.accent if colour is None else colour
-    scored = np.asarray(outcome, np.str_) == "goal"
+    scored = np.asarray(outcome, np.bool_)
     _pitch(axes, colours)
     handles = []
     for these, face, name, zorder in ((scored, colour, "goals", 4), (~scored, "none", "other shots", 3)):
@@ -176,8 +197,8 @@ def draw_shots(
         axes.scatter(x[these], y[these], area[these], zorder=zorder, **look)
         # The legend's circles have one size, whatever the shots have.
         handles.append(axes.scatter([], [], _SHOT / 4, label=f"{name}  {these.sum()}", **look))
-    place: Any = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 2}
-    axes.legend(handles=handles, frameon=False, labelcolor=colours.ink, borderpad=0.2, **place)
+    # Few shots come from the corners of one's own half, and none from beyond the middle.
+    axes.legend(handles=handles, loc="lower left", frameon=False, labelcolor=colours.ink)
     if half:
         axes.set_xlim(min(0.0, *x) - 1.0 if len(x) else -1.0, axes.get_xlim()[1])
 
@@ -228,16 +249,16 @@ def draw_zones(
         axes.add_patch(
             Rectangle((corner[0], corner[1]), *size, facecolor=colour, alpha=shade, edgecolor="none", zorder=0)
         )
-        axes.annotate(text[along][across], corner + size / 2, ha="center", va="center", color=colours.ink)
+        axes.annotate(text[along][across], corner + size / 2, ha="center", va="center", color=colours.ink, fontsize=8)
 
 
 def _pitch(axes: Any, colours: Colours) -> None:
     draw_pitch(axes, colour=colours.muted, width=0.7)
 
 
-def _discs(axes: Any, places: Floats, unums: Sequence[int], sizes: Floats, *, colour: str, colours: Colours) -> None:
+def _discs(axes: Any, places: Floats, unums: ArrayLike, sizes: Floats, *, colour: str, colours: Colours) -> None:
     """Draw players of some diameters (n,) in points."""
-    for place, unum, size in zip(places, unums, sizes, strict=True):
+    for place, unum, size in zip(places, np.asarray(unums), sizes, strict=True):
         if np.isfinite(place).all():
             axes.plot(
                 *place, "o", markersize=size, color=colour, markeredgecolor=colours.paper, markeredgewidth=0.8, zorder=5
@@ -298,12 +319,24 @@ def _shares(values: Floats) -> Floats:
     return shares
 
 
-def _ascending(counts: Floats, least: int) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of (n, n) counts that are at least so many, the most at last, so that they lie on top."""
+def _ascending(counts: Floats, least: float) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of (n, n) counts that are at least so many and any, the most at last: they lie on top."""
     for pair in np.argsort(counts, axis=None, kind="stable"):
         passer, receiver = divmod(int(pair), len(counts))
-        if counts[passer, receiver] >= max(least, 1):
+        if counts[passer, receiver] >= least and counts[passer, receiver] > 0:
             yield passer, receiver
+
+
+def _bandwidth(counts: Floats) -> Floats:
+    """Return the standard deviations (2,) in cells that suit counts (nx, ny).
+
+    Three quarters of what Scott's rule gives (Scott 1992), since that is meant for a single hump.
+    """
+    total = counts.sum()
+    cells = np.indices(counts.shape).reshape(2, -1)
+    variance = np.cov(cells, aweights=counts.ravel(), bias=True).diagonal()
+    bandwidth: Floats = 0.75 * np.sqrt(variance) * total ** (-1.0 / 6.0)
+    return bandwidth
 
 
 def _smoothed(counts: Floats, deviation: Floats) -> Floats:

@@ -227,7 +227,7 @@ def _api() -> str:
 
 
 def _described(path: str, thing: Any, *, level: int) -> str:
-    """One public function, class or value."""
+    """One public function, class, module or value."""
     name = path.rpartition(".")[2]
     parts = [f"{'#' * level} {name}"]
     if inspect.isclass(thing) or callable(thing):
@@ -235,6 +235,8 @@ def _described(path: str, thing: Any, *, level: int) -> str:
     parts += _prose(inspect.getdoc(thing) or "")
     if inspect.isclass(thing) and not issubclass(thing, BaseException):
         parts += [_described(f"{name}.{member}", found, level=level + 1) for member, found in _members(thing)]
+    if inspect.ismodule(thing):
+        parts += [_described(f"{path}.{member}", getattr(thing, member), level=level + 1) for member in thing.__all__]
     return "\n\n".join(parts)
 
 

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from teamclone import plot
     from teamclone.api import LoadedClone, load, match_events
     from teamclone.comparison.compare import Comparison, compare, write_comparison
     from teamclone.dataset.build import DatasetConfig, build_dataset
@@ -71,9 +72,10 @@ _HOME = {
     "compare": "comparison.compare",
     "Comparison": "comparison.compare",
     "write_comparison": "comparison.compare",
+    "plot": "plot",
     "TeamcloneError": "errors",
 }
-"""The module of each public name, in the order of the pipeline."""
+"""The module of each public name, in the order of the pipeline; `plot` is one itself."""
 
 __all__ = [
     "Bodies",
@@ -105,6 +107,7 @@ __all__ = [
     "open_dataset",
     "open_run",
     "open_store",
+    "plot",
     "read_match",
     "step",
     "team_statistics",
@@ -116,7 +119,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+        module = import_module(f"{__name__}.{_HOME[name]}")
+        value = module if name == _HOME[name] else getattr(module, name)
         globals()[name] = value
         return value
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

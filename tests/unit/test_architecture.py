@@ -44,10 +44,11 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "comparison": (*READING, "plots", "play.holes", "evaluation.bootstrap"),
     "replay": (*BASE, "plots", "logs", "dynamics", "events", "store", "training", "evaluation", "rollouts"),
     "live": (*BASE, "protocol", "logs", "dynamics", "world", "dataset", "engine", "models", "training", "evaluation"),
+    "plot": ("errors", "rcss", "plots", "logs", "events", "world"),
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "engine", "models", "training", "search", "evaluation", "pipeline"),
     "cli": (*READING, *CLONING, "rollouts", "report", "comparison", "replay", "protocol", "live", "pipeline", "api"),
-    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "comparison", "replay", "api"),
+    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "comparison", "replay", "plot", "api"),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from teamclone.dynamics.inverse.columns import recovered_commands
-from teamclone.errors import StoreError, UsageError, choose
+from teamclone.errors import StoreError, UsageError
 from teamclone.logs.columns import Source
-from teamclone.logs.match import Columns, Match
+from teamclone.logs.match import Columns, Match, side_named
 from teamclone.rcss.player_types import FIELDS
 from teamclone.store.postgres.location import masked
 from teamclone.store.store import Store
@@ -96,16 +96,4 @@ class MatchColumns:
         Raises:
             UsageError: neither or both are named, or the team does not play.
         """
-        sides = {"left": 1, "right": -1}
-        if (team is None) == (side is None):
-            raise UsageError(f"match {self.match_id}: name either a team ({self.left}, {self.right}) or a side")
-        if side is not None:
-            if side not in sides:
-                raise UsageError(f"expected the side left or right, got {side!r}")
-            return sides[side]
-        names = [name for name in (self.left, self.right) if name]
-        if team not in names:
-            raise UsageError(f"match {self.match_id}: no team {team!r}; {choose(str(team), names)}")
-        if self.left == self.right:
-            raise UsageError(f"match {self.match_id}: both teams are called {team!r}; name a side instead")
-        return 1 if team == self.left else -1
+        return side_named(self.match_id, self.left, self.right, team=team, side=side)

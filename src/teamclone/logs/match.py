@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.errors import place
+from teamclone.errors import UsageError, choose, place
 from teamclone.logs import columns
 from teamclone.rcss import player_types as types_of
 
@@ -168,6 +168,30 @@ class Match:
             raise IndexError(index)
         start, stop = self.log.commands["text_start"][index], self.log.commands["text_stop"][index]
         return self.log.text[start:stop].decode("utf-8", "replace")
+
+
+def side_named(match_id: str, left: str | None, right: str | None, *, team: str | None, side: str | None) -> int:
+    """Return the side of a match that ``team`` or ``side`` names, 1 left or -1 right.
+
+    Args:
+        left, right: names of the teams, None for an empty side.
+
+    Raises:
+        UsageError: neither or both are named, or the team does not play.
+    """
+    sides = {"left": 1, "right": -1}
+    if (team is None) == (side is None):
+        raise UsageError(f"match {match_id}: name either a team ({left}, {right}) or a side")
+    if side is not None:
+        if side not in sides:
+            raise UsageError(f"expected the side left or right, got {side!r}")
+        return sides[side]
+    names = [name for name in (left, right) if name]
+    if team not in names:
+        raise UsageError(f"match {match_id}: no team {team!r}; {choose(str(team), names)}")
+    if left == right:
+        raise UsageError(f"match {match_id}: both teams are called {team!r}; name a side instead")
+    return 1 if team == left else -1
 
 
 def empty_columns(spec: tuple[columns.Column, ...], *shape: int) -> Columns:

@@ -24,7 +24,6 @@ def draw_fans(fans: Sequence[Mapping[str, Any]], *, colours: Colours, width: flo
         axes.set_axis_off()
     for axes, fan in zip(grid.flat, fans, strict=False):
         draw_fan(axes, fan, colours=colours)
-        axes.set_title(f"cycle {fan['cycle']}, {fan['ahead']} cycles ahead")
     return figure
 
 
@@ -39,3 +38,4 @@ def draw_fan(axes: Any, fan: Mapping[str, Any], *, colours: Colours) -> None:
             axes.plot(*zip(*path, strict=True), color=colour, linewidth=0.5, alpha=0.25, zorder=2)
         axes.plot(*zip(*body["truth"], strict=True), color=colours.ink, linewidth=1.1, zorder=3)
         axes.plot(*body["truth"][0], "o", color=colour, markersize=2.6, zorder=4)
+    axes.set_title(f"cycle {fan['cycle']}, {fan['ahead']} cycles ahead")

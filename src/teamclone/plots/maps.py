@@ -22,9 +22,11 @@ Floats = NDArray[np.float64]
 
 DISC = 13.0
 """Diameter of a player, points: two digits fit."""
+LINE = 0.7
+"""Width of the pitch's lines, points."""
 LEVELS = 9
 """Of a heat map."""
-LEAST_SMOOTH_M = 1.5
+LEAST_SMOOTH_M = 2.5
 """Least standard deviation by which counts of a heat map are spread."""
 STRONGEST = 0.75
 """Opacity of the greatest value: lines and letters above it stay legible."""
@@ -51,7 +53,7 @@ def draw_formation(
     _pitch(axes, colours)
     draw_players(axes, places, unums=unums, colours=colours, colour=colour, spread=spread, labels=labels)
     if ball is not None:
-        _ball(axes, ball, colours)
+        draw_ball(axes, ball, colours=colours)
 
 
 def draw_players(
@@ -92,6 +94,12 @@ def draw_players(
         look: Any = {"textcoords": "offset points", "ha": "center", "va": "top", "fontsize": 7, "color": colours.muted}
         for place, label in zip(places[there], np.asarray(labels)[there], strict=True):
             axes.annotate(label, place, (0, -DISC / 2 - 1), zorder=6, **look)
+
+
+def draw_ball(axes: Any, place: ArrayLike, *, colours: Colours) -> None:
+    """Draw the ball at a place (2,) m, onto a pitch that is there."""
+    look: Any = {"color": colours.ink, "markeredgecolor": colours.paper, "markeredgewidth": 0.8}
+    axes.plot(*np.asarray(place, np.float64), "o", markersize=0.45 * DISC, zorder=7, **look)
 
 
 def draw_pass_network(
@@ -192,8 +200,9 @@ def draw_shots(
     scored = np.asarray(outcome, np.bool_)
     _pitch(axes, colours)
     handles = []
-    for these, face, name, zorder in ((scored, colour, "goals", 4), (~scored, "none", "other shots", 3)):
-        look: Any = {"facecolors": face, "edgecolors": colour, "linewidths": 1.1, "alpha": 0.85}
+    kinds = ((scored, colour, colours.paper, "goals", 4), (~scored, "none", colour, "other shots", 3))
+    for these, face, edge, name, zorder in kinds:
+        look: Any = {"facecolors": face, "edgecolors": edge, "linewidths": 1.1, "alpha": 0.85}
         axes.scatter(x[these], y[these], area[these], zorder=zorder, **look)
         # The legend's circles have one size, whatever the shots have.
         handles.append(axes.scatter([], [], _SHOT / 4, label=f"{name}  {these.sum()}", **look))
@@ -253,7 +262,7 @@ def draw_zones(
 
 
 def _pitch(axes: Any, colours: Colours) -> None:
-    draw_pitch(axes, colour=colours.muted, width=0.7)
+    draw_pitch(axes, colour=colours.muted, width=LINE)
 
 
 def _discs(axes: Any, places: Floats, unums: ArrayLike, sizes: Floats, *, colour: str, colours: Colours) -> None:
@@ -273,18 +282,6 @@ def _discs(axes: Any, places: Floats, unums: ArrayLike, sizes: Floats, *, colour
                 color=colours.paper,
                 zorder=6,
             )
-
-
-def _ball(axes: Any, place: ArrayLike, colours: Colours) -> None:
-    axes.plot(
-        *np.asarray(place, np.float64),
-        "o",
-        markersize=0.45 * DISC,
-        color=colours.second,
-        markeredgecolor=colours.paper,
-        markeredgewidth=0.8,
-        zorder=7,
-    )
 
 
 def _arrow(
@@ -330,12 +327,12 @@ def _ascending(counts: Floats, least: float) -> Iterator[tuple[int, int]]:
 def _bandwidth(counts: Floats) -> Floats:
     """Return the standard deviations (2,) in cells that suit counts (nx, ny).
 
-    Three quarters of what Scott's rule gives (Scott 1992), since that is meant for a single hump.
+    Half of what Scott's rule gives (Scott 1992), since that is meant for a single hump.
     """
     total = counts.sum()
     cells = np.indices(counts.shape).reshape(2, -1)
     variance = np.cov(cells, aweights=counts.ravel(), bias=True).diagonal()
-    bandwidth: Floats = 0.75 * np.sqrt(variance) * total ** (-1.0 / 6.0)
+    bandwidth: Floats = 0.5 * np.sqrt(variance) * total ** (-1.0 / 6.0)
     return bandwidth
 
 

@@ -95,33 +95,36 @@ def formation(
         UsageError: the team does not play.
         LogError: a log cannot be read.
     """
-    axes = _axes(axes)
     if isinstance(match, np.ndarray):
+        axes = _axes(axes)
         maps.draw_formation(axes, match, unums=range(1, len(match) + 1), colours=LIGHT)
         return axes
     if ball not in (None, "own half", "other half"):
         raise UsageError(f"expected the ball in the own half or the other half, got {ball!r}")
     phase = {True: "with the ball", False: "without the ball", None: "in play"}[with_ball]
     phase += f", ball in its {ball}" if ball else ""
-    if both := team is None and side is None:
-        only = _only(match)
-        teams = [[(only, 1)], [(only, -1)]]
-        _name_sides(axes, only)
-    else:
-        teams = [list(_played(match, team, side))]
+    both = team is None and side is None
+    only = _only(match) if both else None
+    teams = [[(only, 1)], [(only, -1)]] if only else [list(_played(match, team, side))]
+    seen = [np.concatenate([_standing(_match(one), sign, with_ball, ball) for one, sign in played]) for played in teams]
+    axes = _axes(axes)
     draw_pitch(axes, colour=LIGHT.muted, width=maps.LINE)
-    for played, colour in zip(teams, _COLOURS, strict=False):
-        standing = np.concatenate([_standing(_match(one), sign, with_ball, ball) for one, sign in played])
+    for standing, colour, turned in zip(seen, _COLOURS, (False, True), strict=False):
         places = np.ma.masked_invalid(standing)
         mean, deviation = (values.filled(np.nan) for values in (places.mean(0), places.std(0)))
-        if both and played[0][1] < 0:
-            mean = rotate_point(mean)
-        around = deviation if spread else None
-        maps.draw_players(axes, mean, unums=UNUMS, colours=LIGHT, colour=colour, spread=around)
-    if both:
+        maps.draw_players(
+            axes,
+            rotate_point(mean) if turned else mean,
+            unums=UNUMS,
+            colours=LIGHT,
+            colour=colour,
+            spread=deviation if spread else None,
+        )
+    if only:
         _title(axes, f"mean places {phase}")
+        _name_sides(axes, only)
     else:
-        _title(axes, f"{_name(teams[0])} {phase}", f"{len(standing):,} cycles", _number(teams[0]))
+        _title(axes, f"{_name(teams[0])} {phase}", f"{len(seen[0]):,} cycles", _number(teams[0]))
         _towards(axes)
     return axes
 
@@ -149,7 +152,6 @@ def pass_network(
         UsageError: neither a team nor a side is named, or the team does not play.
         LogError: a log cannot be read.
     """
-    axes = _axes(axes)
     played = list(_played(match, team, side))
     counts, places, ends = np.zeros((N_TEAM, N_TEAM)), np.zeros((N_TEAM, 2)), np.zeros((N_TEAM, 1))
     for one, sign in played:
@@ -163,6 +165,7 @@ def pass_network(
         for player, begin in ((passer, ""), (receiver, "end_")):
             np.add.at(places, player, sign * _points(events, these, begin))
             np.add.at(ends, player, 1)
+    axes = _axes(axes)
     with np.errstate(invalid="ignore"):
         maps.draw_pass_network(axes, places / ends, counts, unums=UNUMS, colours=LIGHT, least=least)
     _title(axes, _name(played), f"{counts.sum():,.0f} completed passes", _number(played))
@@ -193,8 +196,8 @@ def heat_map(
         UsageError: the team does not play, or there is no such kind or number.
         LogError: a log cannot be read.
     """
-    axes = _axes(axes)
     if isinstance(match, np.ndarray):
+        axes = _axes(axes)
         maps.draw_heat(axes, _counted(match), colours=LIGHT)
         return axes
     named = team is not None or side is not None
@@ -208,6 +211,7 @@ def heat_map(
         points = [_standing(_match(one), sign)[:, _slots(unum)] for one, sign in played]
     else:
         points = [_ball(_match(one)) for one, _ in played]
+    axes = _axes(axes)
     maps.draw_heat(axes, _counted(np.concatenate([these.reshape(-1, 2) for these in points])), colours=LIGHT)
     who = (_name(played) + (f" {unum}" if unum else "")) if named else "both teams" if wanted else "ball"
     what = " and ".join(kind.value for kind in wanted) if wanted else "in play"
@@ -234,7 +238,6 @@ def shot_map(
         UsageError: neither a team nor a side is named, or the team does not play.
         LogError: a log cannot be read.
     """
-    axes = _axes(axes, _HALF_SIZE if half else _SIZE)
     played = list(_played(match, team, side))
     places, goals = [], []
     for one, sign in played:
@@ -243,6 +246,7 @@ def shot_map(
         places.append(sign * _points(events, these))
         goals.append(events["outcome"][these] == Outcome.GOAL)
     x, y = np.concatenate(places).T
+    axes = _axes(axes, _HALF_SIZE if half else _SIZE)
     maps.draw_shots(axes, x, y, outcome=np.concatenate(goals), colours=LIGHT, half=half)
     _title(axes, _name(played), f"{len(x)} shots", _number(played))
     return axes
@@ -261,7 +265,6 @@ def moment(match: Match | Path | str, *, cycle: int, stoppage: int = 0, axes: Ax
         UsageError: the match has no such frame.
         LogError: the log cannot be read.
     """
-    axes = _axes(axes)
     found = _match(match)
     frames, players = found.frames, found.players
     at = int(frame_of(frames, np.array([cycle]), np.array([stoppage]), has_stoppage=True)[0])
@@ -270,14 +273,16 @@ def moment(match: Match | Path | str, *, cycle: int, stoppage: int = 0, axes: Ax
         raise UsageError(f"match {found.match_id}: no frame of cycle {cycle}, stoppage {stoppage}; its cycles: {ends}")
     places = np.stack([players["x"][at], players["y"][at]], -1)
     places[(players["state"][at] & state_bits.STAND) == 0] = np.nan
+    axes = _axes(axes)
     draw_pitch(axes, colour=LIGHT.muted, width=maps.LINE)
     for slots, colour in zip(TEAM_SLOTS, _COLOURS, strict=True):
         facing = players["body"][at, slots]
         maps.draw_players(axes, places[slots], unums=UNUMS, colours=LIGHT, colour=colour, body=facing)
     maps.draw_ball(axes, [frames["ball_x"][at], frames["ball_y"][at]], colours=LIGHT)
-    mode = PlayMode(frames["playmode"][at]).name.lower()
+    mode = int(frames["playmode"][at])
+    word = PlayMode(mode).name.lower() if mode < len(PlayMode) else f"play mode {mode}"
     score = f"{frames['left_score'][at]} : {frames['right_score'][at]}"
-    _title(axes, f"cycle {cycle}", mode, score)
+    _title(axes, f"cycle {cycle}", word, score)
     _name_sides(axes, found)
     return axes
 

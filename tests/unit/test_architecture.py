@@ -48,7 +48,18 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "pipeline": (*BASE, "store", "dataset", "play", "training", "evaluation", "report"),
     "api": (*READING, "dataset", "play", "engine", "models", "training", "search", "evaluation", "pipeline"),
     "cli": (*READING, *CLONING, "rollouts", "report", "comparison", "replay", "protocol", "live", "pipeline", "api"),
-    PACKAGE: (*READING, "dynamics", "dataset", "training", "evaluation", "report", "comparison", "replay", "plot", "api"),
+    PACKAGE: (
+        *READING,
+        "dynamics",
+        "dataset",
+        "training",
+        "evaluation",
+        "report",
+        "comparison",
+        "replay",
+        "plot",
+        "api",
+    ),
     "__main__": ("cli",),
 }
 """What a folder, or a module at the top, may import of the package: folders, or modules of them. From low to high."""

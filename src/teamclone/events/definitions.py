@@ -224,6 +224,12 @@ COLUMNS = (
     column("end_y", "float32", "m", "ball position of `end_frame`"),
     column("length", "float32", "m", "distance of the two places"),
     column("speed", "float32", "m/cycle", "way of the ball in the cycle after `frame`; NaN where no touch begins it"),
+    column(
+        "expected_goals",
+        "float32",
+        "",
+        "of a shot: the chance that it scores, by what could be seen before it; NaN of all else and where unknown",
+    ),
 )
 """One value an event: shape (n_events,). ``find.find_events`` makes them."""
 

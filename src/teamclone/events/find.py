@@ -8,6 +8,7 @@ import numpy as np
 
 from teamclone.events import own, possession, referee, transfers
 from teamclone.events.definitions import COLUMNS, EventKind, typed
+from teamclone.events.expected_goals import expected_goals
 from teamclone.events.found import Found
 from teamclone.events.touches import Play
 from teamclone.logs.match import Columns
@@ -53,7 +54,10 @@ def _table(play: Play, found: Sequence[Found]) -> Columns:
     frame = np.concatenate([one.frame for one in found])
     end = np.concatenate([one.end_frame for one in found])
     rank = np.concatenate([np.full(len(one.frame), order.index(one.kind)) for one in found])
+    side = np.concatenate([one.side for one in found])
     touched = np.concatenate([np.full(len(one.frame), one.touched) for one in found])
+    shot, expected = rank == order.index(EventKind.SHOT), np.full(len(frame), np.nan)
+    expected[shot] = expected_goals(play.frames, play.players, frame=frame[shot], side=side[shot])
     start, stop = play.ball[frame], play.ball[end]
     made: Columns = {
         "kind": np.concatenate([np.full(len(one.frame), one.kind.value) for one in found]),
@@ -64,7 +68,7 @@ def _table(play: Play, found: Sequence[Found]) -> Columns:
         "playmode": play.frames["playmode"][frame],
         "end_frame": end,
         "end_cycle": play.frames["cycle"][end],
-        "side": np.concatenate([one.side for one in found]),
+        "side": side,
         "unum": np.concatenate([one.unum for one in found]),
         "other_side": np.concatenate([one.other_side for one in found]),
         "other_unum": np.concatenate([one.other_unum for one in found]),
@@ -74,6 +78,7 @@ def _table(play: Play, found: Sequence[Found]) -> Columns:
         "end_y": stop[:, 1],
         "length": np.hypot(*(stop - start).T),
         "speed": np.where(touched, np.hypot(*play.step[frame].T), np.nan),
+        "expected_goals": expected,
     }
     sort = np.lexsort((rank, frame))
     return typed({name: values[sort] for name, values in made.items()})

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teamclone.events.definitions import EventKind, Outcome
 from teamclone.events.touches import Bools
@@ -25,6 +26,7 @@ class TeamStatistics:
     goals: int = _of("", "goals of the team, the other team's own goals included")
     shots: int = _of("", "shots, those that scored included")
     shots_on_target: int = _of("", "of them scored, saved or blocked on the way between the posts")
+    expected_goals: float = _of("goals", "sum over the shots of the chance of each to score, where it is known")
     possession: float = _of("share", "of the cycles of play_on in which either team has the ball")
     passes: int = _of("", "passes of any outcome but `restart`")
     passes_completed: int = _of("", "of them completed")
@@ -103,6 +105,7 @@ def _side(events: Columns, side: int) -> TeamStatistics:
         goals=count(EventKind.GOAL),
         shots=count(EventKind.SHOT),
         shots_on_target=count(EventKind.SHOT, Outcome.GOAL, Outcome.SAVED, Outcome.BLOCKED),
+        expected_goals=_total(events["expected_goals"][these(EventKind.SHOT)]),
         possession=_share(cycles(side), cycles(side) + cycles(-side)),
         passes=passes,
         passes_completed=int(completed.sum()),
@@ -132,6 +135,11 @@ def _side(events: Columns, side: int) -> TeamStatistics:
         free_kicks=count(EventKind.SET_PLAY, "free kick", "indirect free kick"),
         kicks=count(EventKind.KICK),
     )
+
+
+def _total(chances: NDArray[np.floating[Any]]) -> float:
+    known = chances[~np.isnan(chances)]
+    return math.nan if len(chances) and not len(known) else float(known.sum(dtype=np.float64))
 
 
 def _share(part: int, whole: int) -> float:

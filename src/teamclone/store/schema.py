@@ -22,7 +22,7 @@ from teamclone.system import documents
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FORMAT = 3
+FORMAT = 4
 """Raised whenever a reader of the old tables would misread the new ones."""
 
 SIGNED = {"uint8": "int16", "uint16": "int32", "uint32": "int64"}

@@ -48,6 +48,7 @@ def test_numbers_of_an_event(match: MadeMatch) -> None:
     [row] = np.flatnonzero(events["kind"] == "pass")
     values = {one.name: events[one.name][row].item() for one in COLUMNS}
     assert values.pop("length") == pytest.approx(np.hypot(10, 6))
+    assert np.isnan(values.pop("expected_goals"))
     assert values == {
         **{"kind": "pass", "outcome": "completed", "frame": 3, "cycle": 103, "stoppage": 2, "playmode": 3},
         **{"end_frame": 8, "end_cycle": 108, "side": 1, "unum": 7, "other_side": 1, "other_unum": 9},

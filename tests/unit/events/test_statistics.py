@@ -36,7 +36,9 @@ def made() -> MadeMatch:
 
 
 def test_by_hand() -> None:
-    found = team_statistics(made().events())
+    events = made().events()
+    found = team_statistics(events)
+    [chance] = events["expected_goals"][events["kind"] == "shot"].tolist()
     expected = {
         **{"passes": 4, "passes_completed": 2, "pass_completion": 0.5, "pass_length": 15.0},
         **{"possession": 16 / 24, "kicks": 4},
@@ -46,7 +48,7 @@ def test_by_hand() -> None:
     assert asdict(found.right) == zero | {
         **{"goals": 1, "shots": 1, "shots_on_target": 1, "interceptions": 1, "passes": 1, "passes_completed": 1},
         **{"pass_completion": 1.0, "pass_length": 0.0, "possession": 8 / 24, "tackles_missed": 1, "catches": 1},
-        "kicks": 2,
+        **{"kicks": 2, "expected_goals": chance},
     }
 
 
@@ -59,9 +61,26 @@ def test_a_match_without_events_has_no_shares() -> None:
     assert {value for value in values.values() if value is not None} == {0}
 
 
+def test_goals_are_expected_of_the_shots_whose_chance_is_known() -> None:
+    match = MadeMatch(40)
+    for frame in (3, 20):
+        match.kick(frame, LEFT_9)
+        match.ball(frame, 40, 0)
+        match.ball(frame + 1, 42.5, 0)
+        match.mode(frame + 2, PlayMode.GOAL_KICK_R, frame + 4)
+    both = team_statistics(match.events()).left
+    match.frames["playmode"][20] = PlayMode.PENALTY_READY_L
+    one = team_statistics(match.events()).left
+    assert (both.shots, one.shots) == (2, 2)
+    assert both.expected_goals == pytest.approx(2 * one.expected_goals)
+    assert 0 < one.expected_goals < 1
+    match.players["state"][:, RIGHT_1] = 0
+    assert math.isnan(team_statistics(match.events()).left.expected_goals)
+
+
 def test_every_statistic_is_described() -> None:
     assert [name for name, _, _ in described()] == list(TeamStatistics.__dataclass_fields__)
-    assert all(about and unit in ("", "share", "m") for _, unit, about in described())
+    assert all(about and unit in ("", "share", "m", "goals") for _, unit, about in described())
 
 
 def test_of_real_matches(samples_dir: Path) -> None:
@@ -75,6 +94,7 @@ def test_of_real_matches(samples_dir: Path) -> None:
             assert of.goals == team.score
             assert 0.9 * kicks <= of.kicks <= kicks
             assert of.shots >= of.shots_on_target
+            assert 0 <= of.expected_goals <= of.shots
             assert of.passes >= of.passes_completed > 0
             shares += of.possession
             goals += of.goals

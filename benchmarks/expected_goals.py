@@ -132,12 +132,12 @@ def candidates(shots: Shots) -> Iterator[tuple[str, Any, Floats]]:
     yield "boosted trees, all columns", trees, everything
 
 
-def left_out(estimator: Any, columns: Floats, shots: Shots) -> Floats:
-    """(n,) the chance of each shot by a fit to matches of which its own is none."""
-    folds = GroupKFold(min(N_FOLDS, len(np.unique(shots.match))), shuffle=True, random_state=0)
-    made: Floats = cross_val_predict(
-        estimator, columns, shots.goal, groups=shots.match, cv=folds, method="predict_proba"
-    )[:, 1]
+def left_out(estimator: Any, columns: Floats, shots: Shots, *, groups: NDArray[Any]) -> Floats:
+    """(n,) the chance of each shot by a fit to groups, (n,) matches or teams, of which its own is none."""
+    folds = GroupKFold(min(N_FOLDS, len(np.unique(groups))), shuffle=True, random_state=0)
+    made: Floats = cross_val_predict(estimator, columns, shots.goal, groups=groups, cv=folds, method="predict_proba")[
+        :, 1
+    ]
     return made
 
 
@@ -212,7 +212,10 @@ def main(arguments: list[str] | None = None) -> None:
     shots, names = read(options.folders)
     print(f"{len(names)} matches, {len(shots)} shots, {shots.goal.sum()} goals; {shots.by_outcome.sum()} of these are")
     print("shots only because they scored. Each match by a fit to others:\n")
-    chances = {name: left_out(estimator, columns, shots) for name, estimator, columns in candidates(shots)}
+    chances = {
+        name: left_out(estimator, columns, shots, groups=shots.match) for name, estimator, columns in candidates(shots)
+    }
+    chances["fitted to other teams"] = left_out(regression(), terms(shots.found), shots, groups=shots.by)
     chances[ONE_RATE] = np.full(len(shots), shots.goal.mean())
     print_candidates(shots, chances)
     print_groups("chance", in_bins(chances[MODEL]), shots, chances[MODEL])

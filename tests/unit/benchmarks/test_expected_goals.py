@@ -34,7 +34,7 @@ def test_a_match_is_not_in_its_own_fit(read: tuple[benchmark.Shots, list[str]]) 
     shots, _ = read
     every_second = replace(shots, goal=shots.match % 2 == 0)
     nearest = KNeighborsClassifier(n_neighbors=1)
-    found = benchmark.left_out(nearest, shots.match[:, None].astype(float), every_second)
+    found = benchmark.left_out(nearest, shots.match[:, None].astype(float), every_second, groups=shots.match)
     assert found.tolist() == (~every_second.goal).astype(float).tolist()
 
 

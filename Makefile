@@ -49,6 +49,7 @@ demo: install
 	$(BIN)/teamclone evaluate $(DEMO)/run
 	$(BIN)/teamclone rollout $(DEMO)/run samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --starts 12 --samples 16 --horizon 30
 	$(BIN)/teamclone replay samples/*Cyrus2DBase_0-vs-HELIOS_base*.rcg.xz --run $(DEMO)/run --rollouts $(DEMO)/run/rollouts/fans.json --out $(DEMO)/run/replay.html
+	$(BIN)/teamclone scout $(DEMO)/store --team HELIOS_base --run $(DEMO)/run --out $(DEMO)/run/scout.html
 	$(BIN)/teamclone report $(DEMO)/run
 	$(BIN)/teamclone export $(DEMO)/run --out $(DEMO)/export
 	$(BIN)/teamclone export --check $(DEMO)/export

@@ -22,6 +22,7 @@ from teamclone.cli.app import app
 from teamclone.comparison import profile
 from teamclone.events import definitions, statistics
 from teamclone.models.config import FAMILIES
+from teamclone.scout.sections import SECTIONS
 from teamclone.store import schema
 from teamclone.system.settings import described
 from teamclone.training import config as training_config
@@ -63,6 +64,7 @@ def pages() -> dict[Path, str]:
     made[_command_page("compare")] = _filled(
         _command_page("compare"), options=_options("compare"), statistics=_compared()
     )
+    made[_command_page("scout")] = _filled(_command_page("scout"), options=_options("scout"), measures=_measures())
     made[REFERENCE / "settings.md"] = _filled(REFERENCE / "settings.md", settings=_settings())
     made[REFERENCE / "api.md"] = _filled(REFERENCE / "api.md", api=_api())
     made[REFERENCE / "data-model.md"] = schema.markdown()
@@ -179,6 +181,23 @@ def _columns() -> str:
 def _statistics() -> str:
     """Every statistic of a team."""
     return _table(("statistic", "unit", "meaning"), [(f"`{name}`", *rest) for name, *rest in statistics.described()])
+
+
+def _measures() -> str:
+    """The measures of an opponent report, by section."""
+    better = {1: "more", -1: "less", 0: ""}
+    rows = [
+        (
+            f"`{one.key}`",
+            section.TITLE.lower(),
+            "" if one.unit == "" else one.unit,
+            better[one.good],
+            f"{one.name}: {one.about}",
+        )
+        for section in SECTIONS
+        for one in section.MEASURES
+    ]
+    return _table(("measure", "section", "unit", "better", "meaning"), rows)
 
 
 def _compared() -> str:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from teamclone.logs import Match, find_matches, read_match
     from teamclone.replay.page import make_replay
     from teamclone.report.page import make_report
+    from teamclone.scout.scout import scout_team
+    from teamclone.scout.write import write_scout
     from teamclone.store.ingest import ingest
     from teamclone.store.opening import create_store, open_store
     from teamclone.training.config import load_config
@@ -72,6 +74,8 @@ _HOME = {
     "compare": "comparison.compare",
     "Comparison": "comparison.compare",
     "write_comparison": "comparison.compare",
+    "scout_team": "scout.scout",
+    "write_scout": "scout.write",
     "plot": "plot",
     "TeamcloneError": "errors",
 }
@@ -109,11 +113,13 @@ __all__ = [
     "open_store",
     "plot",
     "read_match",
+    "scout_team",
     "step",
     "team_statistics",
     "train",
     "view",
     "write_comparison",
+    "write_scout",
 ]
 
 

@@ -141,12 +141,21 @@ class Standin:
         ports = [f"server::{name}={port + place}" for place, name in enumerate(("port", "coach_port", "olcoach_port"))]
         logs = [f"server::{kind}_log_dir={folder}" for kind in ("game", "text")]
         self.port = port
-        self.process = subprocess.Popen(
-            [sys.executable, STANDIN / "server.py", *ports, *logs, *words],
-            env={"RCSS_CONF_DIR": str(folder / "conf"), "PATH": "/usr/bin:/bin", **faults},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        self.output = folder / "server.txt"
+        with self.output.open("w") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, STANDIN / "server.py", *ports, *logs, *words],
+                env={"RCSS_CONF_DIR": str(folder / "conf"), "PATH": "/usr/bin:/bin", **faults},
+                stdout=output,
+                stderr=subprocess.DEVNULL,
+            )
+
+    def wait_for_words(self, words: str) -> None:
+        """Waits until the server has said something."""
+        end = time.monotonic() + 120
+        while words not in self.output.read_text():
+            assert time.monotonic() < end, f"the server never said {words!r}"
+            time.sleep(0.05)
 
     def end(self) -> None:
         self.process.send_signal(signal.SIGINT)
@@ -223,8 +232,7 @@ def test_ctrl_c_says_bye(standin: Standin, tmp_path: Path, run: Path) -> None:
 @pytest.mark.parametrize("standin", [{"STANDIN_DROP_AT": "20"}], indirect=True)
 def test_a_player_whose_connection_is_lost_comes_back(standin: Standin, tmp_path: Path, run: Path) -> None:
     with alone(run, standin.port, "--json") as team:
-        wait_for_play(standin)
-        time.sleep(3)
+        standin.wait_for_words("A new (reconnect) player")
         wait_for_play(standin)
         standin.end()
         out, _ = team.communicate(timeout=60)

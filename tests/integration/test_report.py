@@ -26,7 +26,7 @@ from teamclone.evaluation.evaluate import evaluate, load_evaluation
 from teamclone.evaluation.predict import predict
 from teamclone.models.clone import model_id
 from teamclone.rcss.commands import CLONED_KINDS
-from teamclone.report.page import make_report, number, percent, replays_of
+from teamclone.report.page import make_report, number, pages_of, percent
 from teamclone.training.checkpoint import save_weights
 from teamclone.training.config import load_config
 from teamclone.training.loop import train
@@ -260,16 +260,20 @@ def test_report_keeps_what_is_fresh_and_renews_what_is_stale(run: Run) -> None:
     assert load_evaluation(run.path / "evaluation.json")["run"]["model_id"] == model_id(other)
 
 
-def test_it_links_to_the_replays_beside_the_run(run: Run, tmp_path: Path) -> None:
-    assert replays_of(run, run.path) == []
+def test_it_links_to_the_pages_beside_the_run(run: Run, tmp_path: Path) -> None:
+    assert pages_of(run, run.path, "replay") == []
     for name in ("replay.html", "replay <b>.html", "other.html"):
         (run.path / name).write_text("", encoding="utf-8")
-    assert ("replay.html", "./replay.html") in replays_of(run, run.path)
+    assert ("replay.html", "./replay.html") in pages_of(run, run.path, "replay")
     elsewhere = make_report(run, out=tmp_path / "pages" / "x.html", quick_predictions=0)
     links = re.findall(r'<a href="([^"]*)">(replay[^<]*)</a>', elsewhere.read_text(encoding="utf-8"))
     assert [name for _, name in links] == ["replay &lt;b&gt;.html", "replay.html"]
     for address, _ in links:
         assert (elsewhere.parent / unquote(address)).is_file()
+    assert "scout.html</a>" not in elsewhere.read_text(encoding="utf-8")
+    (run.path / "scout.html").write_text("", encoding="utf-8")
+    beside = make_report(run, quick_predictions=0)
+    assert '<a href="./scout.html">scout.html</a>' in beside.read_text(encoding="utf-8")
 
 
 def test_command_line(run: Run, tmp_path: Path) -> None:

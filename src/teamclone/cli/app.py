@@ -27,6 +27,7 @@ from teamclone.cli import (
     replay,
     report,
     rollout,
+    scout,
     search,
     sql,
     train,
@@ -41,6 +42,7 @@ EXTRAS = {
     "safetensors": "train",
     "tensorboard": "train",
     "matplotlib": "report",
+    "scipy": "report",
     "jinja2": "report",
     "optuna": "search",
     "distributed": "cluster",
@@ -78,6 +80,7 @@ for command in (
     report.report,
     bench.bench,
     compare.compare,
+    scout.scout,
     export.export,
 ):
     app.command()(command)

@@ -16,7 +16,7 @@ from teamclone.comparison.distance import Distances, Pairing
 from teamclone.comparison.profile import NUMBERS, POSITIONS, SPEED_BIN, SPEEDS, STATISTICS, Floats, Profile, profile
 from teamclone.errors import StoreError, UsageError, choose
 from teamclone.evaluation import bootstrap
-from teamclone.store import schema
+from teamclone.store.of_team import TeamMatch, matches_of
 from teamclone.store.postgres.location import masked
 from teamclone.store.store import Store
 from teamclone.system.documents import write_document
@@ -88,14 +88,14 @@ def compare(
     """
     telling = on_progress or (lambda work, done, total: None)
     names = (team, clone_team or team)
-    rows = [_rows(store, name) for store, name in zip((original, clone), names, strict=True)]
-    common = _common(rows, (original, clone), names, opponents)
-    twice = {row["match_id"] for row, *_ in rows[0]} & {row["match_id"] for row, *_ in rows[1]}
+    matches = [matches_of(store, name) for store, name in zip((original, clone), names, strict=True)]
+    common = _common(matches, (original, clone), names, opponents)
+    twice = {one.match_id for one in matches[0]} & {one.match_id for one in matches[1]}
     if names[0] == names[1] and twice:
         raise UsageError(f"match {min(twice)} is in both stores; expected matches of the original in one of them alone")
     samples = [
-        _sample(store, these, common, work, telling)
-        for store, these, work in zip((original, clone), rows, ("original", "clone"), strict=True)
+        _sample(store, these, team=name, common=common, whose=work, telling=telling)
+        for store, these, name, work in zip((original, clone), matches, names, ("original", "clone"), strict=True)
     ]
     groups = _groups(samples, common)
     failed = [text for sample in samples for text in sample.failed]
@@ -136,50 +136,28 @@ def write_comparison(comparison: Comparison, out: Path) -> None:
 
 # Which matches
 
-_Row = tuple[dict[str, Any], int, str | None]
-"""The row of a match in the table ``matches``, the side of the team, and why it is left out; None if it is not."""
 
-
-def _rows(store: Store, team: str) -> list[_Row]:
-    """Return the matches of a team in a store.
-
-    Raises:
-        UsageError: it has none.
-    """
-    found: list[_Row] = []
-    names: set[str] = set()
-    for match_id in store.match_ids():
-        try:
-            (row,) = store.read_table(match_id, schema.MATCHES.name).to_pylist()
-        except StoreError as error:
-            found.append(({"match_id": match_id, "opponent": None, "error": str(error)}, 0, None))
-            continue
-        sides = {1: row["left_name"], -1: row["right_name"]}
-        names |= {name for name in sides.values() if name}
-        for side, name in sides.items():
-            if name == team:
-                other = sides[-side]
-                reason = None
-                if other == team or not other:
-                    reason = "the team plays against itself" if other else "there is no opponent"
-                elif not row["complete"]:
-                    reason = "its game log was not closed by the server"
-                found.append((row | {"opponent": other}, side, reason))
-                break
-    if team not in names:
-        raise UsageError(f"{masked(store.location)}: no matches of {team!r}; {choose(team, sorted(names))}")
-    return found
+def _reason(match: TeamMatch, team: str) -> str | None:
+    """Return why a match is left out, None if it is not."""
+    if match.opponent == team:
+        return "the team plays against itself"
+    if not match.opponent:
+        return "there is no opponent"
+    return None if match.row["complete"] else "its game log was not closed by the server"
 
 
 def _common(
-    rows: Sequence[list[_Row]], stores: Sequence[Store], names: Sequence[str], wanted: Collection[str]
+    matches: Sequence[list[TeamMatch]], stores: Sequence[Store], names: Sequence[str], wanted: Collection[str]
 ) -> list[str]:
     """Return the opponents that both teams have played, of those that are wanted.
 
     Raises:
         UsageError: there is none, or one that is wanted is not among them.
     """
-    there = [{row["opponent"] for row, _, reason in these if row["opponent"] and reason is None} for these in rows]
+    there = [
+        {str(one.opponent) for one in these if one.error is None and _reason(one, name) is None}
+        for these, name in zip(matches, names, strict=True)
+    ]
     common = sorted(there[0] & there[1])
     if not common:
         told = "; ".join(
@@ -193,23 +171,25 @@ def _common(
     return [name for name in common if not wanted or name in wanted]
 
 
-def _sample(store: Store, rows: list[_Row], common: Collection[str], whose: str, telling: Progress) -> _Sample:
+def _sample(
+    store: Store, matches: list[TeamMatch], *, team: str, common: Collection[str], whose: str, telling: Progress
+) -> _Sample:
     made = _Sample(profiles=[], left_out=[], failed=[])
-    for done, (row, side, reason) in enumerate(rows):
-        telling(f"read {whose}", done, len(rows))
-        if "error" in row:
-            made.failed.append(row["error"])
+    for done, match in enumerate(matches):
+        telling(f"read {whose}", done, len(matches))
+        if match.error is not None:
+            made.failed.append(match.error)
             continue
-        if why := reason or (None if row["opponent"] in common else "its opponent is not compared"):
+        if why := _reason(match, team) or (None if match.opponent in common else "its opponent is not compared"):
             made.left_out.append(
-                {"whose": whose, "match_id": row["match_id"], "opponent": row["opponent"] or "", "reason": why}
+                {"whose": whose, "match_id": match.match_id, "opponent": match.opponent or "", "reason": why}
             )
             continue
         try:
-            made.profiles.append(profile(store, row, side=side))
+            made.profiles.append(profile(store, match.row, side=match.side))
         except StoreError as error:
             made.failed.append(str(error))
-    telling(f"read {whose}", len(rows), len(rows))
+    telling(f"read {whose}", len(matches), len(matches))
     return made
 
 

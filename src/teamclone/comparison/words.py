@@ -26,7 +26,7 @@ def amount(value: float | None, unit: str) -> str:
         return NOTHING
     if unit == "share":
         return f"{amount(100 * value, '')} %"
-    digits = 0 if abs(value) >= 1000 else 1 if abs(value) >= 10 else 2 if abs(value) >= 1 else 3
+    digits = 0 if abs(value) >= 1000 or value == 0 else 1 if abs(value) >= 10 else 2 if abs(value) >= 1 else 3
     return f"{value:,.{digits}f}"
 
 

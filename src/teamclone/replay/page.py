@@ -93,6 +93,7 @@ def make_replay(
     checkpoint: str = "best-loss",
     rollouts: Path | str | None = None,
     jasmin: Path | str | None = None,
+    home: str | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Replay:
     """Write a match as one HTML file that plays it in a browser.
@@ -110,6 +111,8 @@ def make_replay(
         checkpoint: which weights of the run.
         rollouts: ``fans.json`` or ``trajectories.parquet`` of `teamclone rollout`, whose fans of futures are shown.
         jasmin: where to write the match for the 3-D player JaSMIn, too.
+        home: address of the page that the replay belongs to, as seen from it; None for the report of the run, if it
+            lies beside.
         on_progress: called with the predictions made and their number.
 
     Returns:
@@ -133,8 +136,9 @@ def make_replay(
     fans = [] if rollouts is None else read_fans(Path(rollouts), columns)
     events = listed(find_events(columns.frames, columns.players, columns.params), columns.frames)
     path = Path(out)
-    beside_report = run is not None and path.parent.resolve() == Path(run).resolve()
-    page, notes = _page(columns, expected, fans=fans, events=events, says=says, report=beside_report)
+    if home is None and run is not None and path.parent.resolve() == Path(run).resolve():
+        home = "report.html"
+    page, notes = _page(columns, expected, fans=fans, events=events, says=says, home=home)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, page)
     if jasmin is not None:
@@ -180,16 +184,16 @@ def _page(
     fans: list[dict[str, Any]],
     events: Sequence[Event],
     says: Says,
-    report: bool,
+    home: str | None,
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Return the page and the notes on it; ``report``: whether the report of the run lies beside it."""
+    """Return the page and the notes on it; ``home``: address of the page that it belongs to."""
     channels = [
         *of_match(match.frames, match.players),
         *of_commands(match.frames, match.players, match.commands, match.params),
         *expected.channels,
     ]
     notes = [*expected.notes, *_notes(match, {channel.name for channel in channels})]
-    head = {**_head(match, expected, fans=fans, events=events), "report": report}
+    head = {**_head(match, expected, fans=fans, events=events), "home": home}
     page = _assembled(packed({**head, "says": says, "notes": notes}, channels))
     if len(page) > MOST_BYTES and says[0]:
         notes.append("What players said is left out: with it the page would be larger than 3 MB.")

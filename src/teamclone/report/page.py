@@ -274,7 +274,15 @@ def make_report(
     path = out or run.path / "report.html"
     history = run.history()
     try:
-        html = render(run, evaluation, bench, history=history, ahead=ahead, replays=replays_of(run, path.parent))
+        html = render(
+            run,
+            evaluation,
+            bench,
+            history=history,
+            ahead=ahead,
+            replays=pages_of(run, path.parent, "replay"),
+            scouts=pages_of(run, path.parent, "scout"),
+        )
     except (*_DAMAGED, jinja2.TemplateError) as error:
         raise RunError(
             f"{run.path}: evaluation.json or bench.json is not what teamclone wrote ({error!r}); make them again with "
@@ -285,9 +293,9 @@ def make_report(
     return path
 
 
-def replays_of(run: Run, folder: Path) -> list[tuple[str, str]]:
-    """Return the replays in the folder of a run: name, and address as seen from a folder."""
-    names = sorted(page.name for page in run.path.glob("replay*.html"))
+def pages_of(run: Run, folder: Path, command: str) -> list[tuple[str, str]]:
+    """Return the pages of a command in the folder of a run: name, and address as seen from a folder."""
+    names = sorted(page.name for page in run.path.glob(f"{command}*.html"))
     beside = Path(os.path.relpath(run.path.resolve(), folder.resolve())).as_posix()
     return [(name, quote(f"{beside}/{name}")) for name in names]
 
@@ -439,6 +447,7 @@ def render(
     history: Sequence[Mapping[str, Any]],
     ahead: Ahead | None = None,
     replays: Sequence[tuple[str, str]] = (),
+    scouts: Sequence[tuple[str, str]] = (),
 ) -> str:
     """Return the report as HTML.
 
@@ -448,7 +457,7 @@ def render(
         bench: from `latency.measure_latency`; None leaves the response times out.
         history: from ``run.history()``; empty leaves the training curves out.
         ahead: from `fresh_rollouts`; None leaves the roll-outs out.
-        replays: from `replays_of`.
+        replays, scouts: pages of these commands, from `pages_of`.
     """
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -485,6 +494,7 @@ def render(
         plots=_plots(evaluation, bench, history, ahead),
         ahead=ahead,
         replays=replays,
+        scouts=scouts,
         trained_error=trained_error(run.config),
         settings=to_toml(run.config),
         versions={**run.environment, **evaluation["versions"]},

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from teamclone.dataset.layout import CATEGORICAL_INDEX
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import RunError
-from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.playmodes import OTHER_SIDE, PlayMode
 from teamclone.system.documents import read_document, write_document
-from teamclone.world.channels import FLAG_GOALIE, TYPE_FIELD
+from teamclone.world.channels import FLAG_GOALIE
+from teamclone.world.traits import ranks
 
 FORMAT = 1
 """Format number of line_up.json."""
@@ -33,7 +33,6 @@ TRAITS = (
 """What a coach may choose a type by: its parameters, and the speed that it reaches with full power."""
 _LEAST_SPREAD = 0.02
 """Standard deviation of a rank below which no preference counts as sharper."""
-_FULL_POWER = 100.0
 
 _PLACES = [[float]]
 _SHAPE = {
@@ -82,8 +81,8 @@ class LineUp:
 
         if len(types) < N_TEAM:
             raise ValueError(f"expected at least {N_TEAM} player types, got {len(types)}")
-        ranks = _ranks(types)
-        cost = (((ranks[None] - self.preferred[:, None]) / self.spread[:, None]) ** 2).sum(axis=2)
+        rank = ranks(types, TRAITS)
+        cost = (((rank[None] - self.preferred[:, None]) / self.spread[:, None]) ** 2).sum(axis=2)
         players, chosen = linear_sum_assignment(cost)
         made: NDArray[np.int64] = np.zeros(N_TEAM, np.int64)
         made[players] = chosen
@@ -127,25 +126,13 @@ def _preferences(
             are left out; where none says, all types are the same to every player.
     """
     had = [
-        _ranks(dataset.player_types[match].numpy())[types]
+        ranks(dataset.player_types[match].numpy(), TRAITS)[types]
         for match, types in zip(matches.tolist(), given, strict=True)
         if types.max() < dataset.player_types.shape[1]
     ]
     if not had:
         return np.zeros((N_TEAM, len(TRAITS))), np.ones((N_TEAM, len(TRAITS)))
     return np.mean(had, axis=0), np.maximum(np.std(had, axis=0), _LEAST_SPREAD)
-
-
-def _ranks(types: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return (n_types, len(TRAITS)) the ranks of the types of a match by each trait, from 0 to 1."""
-    from scipy.stats import rankdata
-
-    of = {name: types[:, TYPE_FIELD[name]].astype(np.float64) for name in FIELDS}
-    reached = _FULL_POWER * of["dash_power_rate"] * of["effort_max"] / (1 - of["player_decay"])
-    of["top_speed"] = np.minimum(reached, of["player_speed_max"])
-    values = np.stack([of[name] for name in TRAITS], axis=1)
-    ranks: NDArray[np.float64] = (rankdata(values, axis=0) - 1) / max(len(types) - 1, 1)
-    return ranks
 
 
 def save_line_up(folder: Path, line_up: LineUp) -> None:

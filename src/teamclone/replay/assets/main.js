@@ -66,7 +66,8 @@ class Replay {
     byId("left-name").textContent = match.teamName(0);
     byId("right-name").textContent = match.teamName(1);
     document.title = `${match.teamName(0)} – ${match.teamName(1)} · teamclone replay`;
-    byId("report").hidden = !match.head.report;
+    byId("home").hidden = !match.head.home;
+    if (match.head.home) byId("home").href = match.head.home;
     for (const speed of SPEEDS) byId("speed").append(new Option(`${speed} ×`, String(speed)));
     for (const [value, text] of [["none", "whole pitch"], ["ball", "follow ball"], ["player", "follow player"]]) byId("follow").append(new Option(text, value));
     for (const kind of ["any", ...this.events.kinds]) byId("jump").append(new Option(kind === "any" ? "next shown" : kind, kind));

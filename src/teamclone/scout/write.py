@@ -1,0 +1,112 @@
+"""The files of a report: the page, its numbers, and replays of the matches that it points into."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import quote
+
+from teamclone.errors import TeamcloneError
+from teamclone.scout.measures import Moment
+from teamclone.scout.page import render
+from teamclone.scout.scout import Report
+from teamclone.store.store import Store
+from teamclone.system.documents import write_document
+from teamclone.system.files import write_atomic
+
+LEAD = 10
+"""Cycles before a moment at which its link begins, so that one sees how it comes about."""
+
+
+def write_scout(
+    report: Report,
+    out: Path,
+    *,
+    store: Store,
+    run: Path | None = None,
+    csv_folder: Path | None = None,
+    on_progress: Callable[[str, int, int], None] | None = None,
+) -> list[str]:
+    """Write the page, a ``.json`` of the same name, and the replays of the matches whose moments it shows.
+
+    Args:
+        out: of the page. Replays go into a folder of its name and ``-replays``.
+        store: where the matches are.
+        run: a run whose predictions the replays show, and whose report the page links to if it lies beside.
+        csv_folder: where each table is written as CSV; None for nowhere.
+
+    Returns:
+        Why replays could not be made, a line each.
+    """
+    telling = on_progress or (lambda work, done, total: None)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    folder = out.with_name(f"{out.stem}-replays")
+    made, failed = {}, []
+    needed = [name for name in report.shown if name in _quoted(report)]
+    for done, match_id in enumerate(needed):
+        telling("make replays", done, len(needed))
+        path = folder / f"{match_id}.html"
+        try:
+            _replay(report, match_id, path, store=store, run=run, home=out)
+            made[match_id] = f"{folder.name}/{path.name}"
+        except (TeamcloneError, OSError) as error:
+            failed.append(f"no replay of match {match_id}: {error}")
+
+    def link(moment: Moment) -> str | None:
+        if moment.match_id not in made:
+            return None
+        side = _side(report, moment)
+        player = f"&p={side}{moment.unum}" if moment.unum else ""
+        cycle = moment.cycle if moment.stoppage else max(moment.cycle - LEAD, 0)
+        stoppage = f".{moment.stoppage}" if moment.stoppage else ""
+        return f"{quote(made[moment.match_id])}#c={cycle}{stoppage}{player}"
+
+    beside = run is not None and out.parent.resolve() == run.resolve()
+    write_document(out.with_suffix(".json"), report.document)
+    if csv_folder is not None:
+        _tables(report, csv_folder)
+    write_atomic(out, render(report, link=link, report_page="report.html" if beside else None).encode())
+    return failed
+
+
+def _quoted(report: Report) -> set[str]:
+    """Return the matches that the page points into."""
+    return {at.match_id for chapter in report.chapters for claim in chapter.findings.claims for at in claim.moments}
+
+
+def _side(report: Report, moment: Moment) -> str:
+    own = next(one.side for one in report.subject.played if one.match_id == moment.match_id)
+    return "l" if (own > 0) == moment.own else "r"
+
+
+def _replay(report: Report, match_id: str, path: Path, *, store: Store, run: Path | None, home: Path) -> None:
+    from teamclone.replay.page import make_replay
+
+    teams = (report.subject.team,) if run is not None else ()
+    back = Path(os.path.relpath(home.resolve(), path.parent.resolve())).as_posix()
+    make_replay(match_id, path, store=store, run=run, teams=teams, home=quote(back))
+
+
+def _tables(report: Report, folder: Path) -> None:
+    """Write each table, and the measures, as CSV."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for chapter in report.chapters:
+        for table in chapter.findings.tables:
+            text = io.StringIO()
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerow(table.columns)
+            writer.writerows(table.rows)
+            write_atomic(folder / f"{chapter.key}-{table.name}.csv", text.getvalue().encode())
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    ends = ("value", "low", "high", "matches")
+    names = ("key", "section", "name", "unit", "about")
+    writer.writerow([*names, *ends, *(f"opponents_{end}" for end in ends)])
+    for one in report.document["measures"]:
+        writer.writerow(
+            [*(one[name] for name in names), *(one[of][end] for of in ("team", "opponents") for end in ends)]
+        )
+    write_atomic(folder / "measures.csv", text.getvalue().encode())

@@ -24,8 +24,8 @@ LEAST_SHOTS = 30
 """With fewer, groups of shots say nothing about expected goals."""
 GROUPS = 5
 UNUMS = range(1, N_TEAM + 1)
-SHARES = (0.2, 1.0)
-"""Shares of a zone without any colour and with the strongest one."""
+RATIOS = (0.2, 1.0)
+"""Ratios of a zone without any colour and with the strongest one."""
 
 
 CELL_M = 8.0
@@ -68,7 +68,7 @@ def formations(drawn: Sequence[tuple[str, Floats]]) -> Figure:
 
 @mpl.rc_context(STYLE)
 def ratios_by_zone(drawn: Sequence[tuple[str, Floats, Floats]]) -> Figure:
-    """Draw shares by zone beside each other: titles, parts and wholes (along, across), nothing in zones without."""
+    """Draw ratios by zone beside each other: titles, parts and wholes (along, across), nothing in zones without."""
     figure, axes = pitches(len(drawn))
     for one, (title, parts, wholes) in zip(axes, drawn, strict=True):
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -77,7 +77,7 @@ def ratios_by_zone(drawn: Sequence[tuple[str, Floats, Floats]]) -> Figure:
             [f"{share:.0%}\n{int(n):,}" if n else "" for share, n in zip(*row, strict=True)]
             for row in zip(shares, wholes, strict=True)
         ]
-        draw_zones(one, shares, text=text, colours=COLOURS, scale=SHARES)
+        draw_zones(one, shares, text=text, colours=COLOURS, scale=RATIOS)
         one.set_title(title)
     return figure
 

@@ -130,9 +130,7 @@ class Foresight:
             notes.append(f"The clone learned from {self.run.team}, so what it foresees of {subject.team} is a guess.")
         if looks:
             one = "match" if len(looks) == 1 else "matches"
-            notes.append(
-                f"The clone of {self.run.path.name} was asked in {len(looks)} {one}, {_learned(new, trained)}."
-            )
+            notes.append(f"The clone of {self.run.path.name} was asked in {len(looks)} {one} {_learned(new, trained)}.")
         kept = Looks(looks, MEASURES)
         kept.shown = frozenset(shown)
         return tell_predicted(kept, notes)
@@ -157,8 +155,8 @@ def _trained_on(run: Run) -> set[str] | None:
 
 def _learned(new: Sequence[TeamMatch], trained: set[str] | None) -> str:
     if trained is None:
-        return "and nobody knows whether it learned from them, as its dataset is gone"
-    return "none of which it learned from" if new else "from which it learned: of others it foresees less"
+        return "of which nobody knows whether it learned from them, as its dataset is gone"
+    return "that it did not learn from" if new else "that it learned from, too, so of others it foresees less"
 
 
 def look(seen: Seen, table: pa.Table) -> Look:
@@ -300,7 +298,11 @@ def _by_number(looks: Looks) -> Claim | None:
 def _surprised(looks: Looks) -> Claim | None:
     """Show what surprised the clone most."""
     moments = looks.moments("surprise", most=SHOWN)
-    return Claim(template="What surprised the clone most:", moments=moments) if moments else None
+    return (
+        Claim(template=f"Most surprising to the clone: {moments[0].text}, cycle {moments[0].cycle}.", moments=moments)
+        if moments
+        else None
+    )
 
 
 def _surprise_table(looks: Looks) -> Table:

@@ -204,6 +204,7 @@ def test_it_tells_habits_with_moments_of_shown_matches() -> None:
     assert [(one.match_id, one.cycle) for one in habit.moments] == [("m3", 102), ("m1", 102)]
     for picture in findings.pictures:
         picture.draw()
+    assert not any("goalkeeper" in one.text for one in findings.claims)
     assert [row[0] for table in findings.tables if table.name == "predictability" for row in table.rows] == [
         "Made {team}",
         "Other",
@@ -211,9 +212,13 @@ def test_it_tells_habits_with_moments_of_shown_matches() -> None:
 
 
 def test_a_real_match_alone_can_be_told(seen: Seen) -> None:
-    findings = habits.tell(subject_of([habits.look(seen)]))
-    assert findings.claims
-    for picture in findings.pictures:
+    look = habits.look(seen)
+    alone, twice = (habits.tell(subject_of([look] * n)) for n in (1, 2))
+    # Nothing is foreseen of the only match; two tell of each other.
+    assert "foreseen" not in {one.name for one in alone.pictures}
+    assert "foreseen" in {one.name for one in twice.pictures}
+    assert not any("foresees" in one.text for one in alone.claims)
+    for picture in (*alone.pictures, *twice.pictures):
         picture.draw()
 
 

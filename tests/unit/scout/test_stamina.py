@@ -99,8 +99,16 @@ def test_types_by_rank() -> None:
         "8, 9, 10 and 11 get the quickest off the mark types: 86 % (86 to 86) of the others are worse.",
         "8, 9, 10 and 11 get the least precise types: 86 % (86 to 86) of the others are better.",
     ]
+    assert not stamina.tell(subject_of(look, look, look)).notes
     # Two matches may be chance.
     assert not any("types" in one.text for one in stamina.tell(subject_of(look, look)).claims)
+
+
+def test_a_team_that_does_not_choose_types_is_named() -> None:
+    """Every number has the same type, and so none a better one than the others."""
+    look = stamina.look(seen_of(tired(), default_player_types(12)))
+    (note,) = stamina.tell(subject_of(look, look, look)).notes
+    assert note.startswith("No number regularly gets better or worse types")
 
 
 def test_a_substitution_is_a_change_of_type_during_the_match() -> None:
@@ -108,7 +116,7 @@ def test_a_substitution_is_a_change_of_type_during_the_match() -> None:
     match.players["type"][5:, 6] = 3
     look = stamina.look(seen_of(match))
     assert look.arrays["substituted"].tolist() == [[7, pytest.approx(2705 / 6000)]]
-    assert [one.text for one in look.moments["stamina_substitutions"]] == ["7 is substituted"]
+    assert [(one.text, one.cycle) for one in look.moments["stamina_substitutions"]] == [("7 is substituted", 2705)]
     match.frames["cycle"][:] = 0
     assert not len(stamina.look(seen_of(match)).arrays["substituted"])
 

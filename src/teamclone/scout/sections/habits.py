@@ -21,7 +21,7 @@ from teamclone.scout.decisions import (
     decisions,
 )
 from teamclone.scout.distribution import LONG_M, RESTART_KINDS, keeper, restarts
-from teamclone.scout.findings import Claim, Findings, Picture, Table, claim, claims
+from teamclone.scout.findings import Claim, Findings, Picture, Table, capital, claim, claims
 from teamclone.scout.measures import Look, Looks, Measure, Moment, ratio
 from teamclone.scout.places import LANES, THIRDS
 from teamclone.scout.predictability import (
@@ -173,11 +173,7 @@ def tell(subject: Subject) -> Findings:
             *_released(subject, released, each),
             *(_habit(subject, one, f"of the {_times(one)} that it has the ball there") for one in dribbles[:1]),
             *_restart_claims(subject),
-            claim(
-                looks,
-                f"Its goalkeeper plays {{habits_keeper_long}} of the balls {LONG_M:g} m or farther, "
-                "{habits_keeper_left} to the left, {habits_keeper_right} to the right; {habits_keeper_lost} are lost.",
-            ),
+            _keeper(looks),
         ),
         pictures=_pictures(looks, routes),
         tables=[
@@ -185,6 +181,18 @@ def tell(subject: Subject) -> Findings:
             _restart_table(looks),
             _teams(subject),
         ],
+    )
+
+
+def _keeper(looks: Looks) -> Claim | None:
+    """Say where the goalkeeper's balls go, if there are enough of them."""
+    balls = int(looks.of("habits_keeper_long")[1].sum())
+    if balls < LEAST:
+        return None
+    return claim(
+        looks,
+        f"Of the {balls} balls that its goalkeeper plays away, {{habits_keeper_long}} go {LONG_M:g} m or farther, "
+        "{habits_keeper_left} to the left, {habits_keeper_right} to the right; {habits_keeper_lost} are lost.",
     )
 
 
@@ -219,7 +227,7 @@ def _by_opponent(subject: Subject) -> dict[str, Floats]:
 
 def _released(subject: Subject, found: Sequence[Habit], each: Floats) -> list[Claim | None]:
     """Say what is nearly always done when the ball is let go, once for each number and what it does."""
-    lead = "" if found else "No number has a habit there. The nearest to one: "
+    lead = "" if found else "No number nearly always lets the ball go in the same way. The nearest: "
     once: dict[tuple[int | None, int], Habit] = {}
     for one in found or _of_releases(each, SURE / 2)[:1]:
         once.setdefault((one.cell[0], one.answer), one)
@@ -240,7 +248,7 @@ def _times(one: Habit) -> str:
 
 def _habit(subject: Subject, one: Habit, of: str, lead: str = "") -> Claim | None:
     words = f"{_where(one)}{NEAR[one.cell[-1]] or ','} {_number(one)} {ANSWERS[one.answer]}: {{share}} {of}."
-    text = lead + words[0].upper() + words[1:]
+    text = lead + words if lead else capital(words)
     return _claim(text, {"share": (one.parts, one.wholes)}, _moments(subject, one))
 
 
@@ -319,15 +327,18 @@ def _pictures(looks: Looks, routes: Sequence[Habit]) -> list[Picture]:
         (words, hits(counts).sum((0, 1, 4)), counts.sum((0, 1, 4, 5)))
         for words, counts in (("what it does next", each), ("when it lets the ball go", each[..., RELEASES]))
     ]
-    pictures = [
-        Picture(
-            name="foreseen",
-            draw=lambda: figures.ratios_by_zone(zones),
-            alt="How much of its decisions is foreseen, by zone of the ball",
-            caption="Where it is easy to foresee: the share of decisions that are what the same number did most often "
-            "there in the other matches, and how many decisions there were. On the left, dribbling on counts, too.",
+    pictures = []
+    if len(each) >= 2:
+        pictures.append(
+            Picture(
+                name="foreseen",
+                draw=lambda: figures.ratios_by_zone(zones),
+                alt="How much of its decisions is foreseen, by zone of the ball",
+                caption="Where it is easy to foresee: the share of decisions that are what the same number did most "
+                "often there in the other matches, and how many decisions there were. On the left, dribbling on "
+                "counts, too.",
+            )
         )
-    ]
     places = looks.total("places")
     drawn_routes = [drawn.route(one, places) for one in routes[: drawn.MOST_ROUTES]]
     if drawn_routes:

@@ -338,6 +338,13 @@ def tell(subject: Subject) -> Findings:
         notes.append("No log reaches the last quarter of a half, where players get tired.")
     if not np.isfinite(looks.each("types")).any():
         notes.append("No log describes the types of the players.")
+    types = _types(looks)
+    if not types and len(looks) >= LEAST_MATCHES and not notes:
+        *others, last = (key for key, *_ in TRAITS.values())
+        notes.append(
+            f"No number regularly gets better or worse types than the others, by {', '.join(others)} or {last}: nobody "
+            "chooses them by that."
+        )
     groups = [(words, _groups(looks.total("depth"))[key]) for key, words, _ in GROUPS]
     return Findings(
         claims=claims(
@@ -365,7 +372,7 @@ def tell(subject: Subject) -> Findings:
                 "{stamina_goals_against_late} in it.",
             ),
             _substitutions(looks),
-            *_types(looks),
+            *types,
         ),
         pictures=_pictures(looks, other, groups),
         tables=[_by_number(looks, groups)],

@@ -56,9 +56,8 @@ def folder(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def predicted(folder: Path, log: Path) -> Path:
     """A page with the predictions of both teams and with futures."""
-    assert unpack_page(make_replay(log, folder / "run" / "replay.html", run=folder / "run").path.read_text()).head[
-        "report"
-    ]
+    beside = make_replay(log, folder / "run" / "replay.html", run=folder / "run").path
+    assert unpack_page(beside.read_text()).head["home"] == "report.html"
     size = ("--starts", 2, "--samples", 3, "--horizon", 12)
     invoked("rollout", folder / "run", log, *size, "--trajectories", "--out", folder / "rollouts")
     made = make_replay(
@@ -160,7 +159,7 @@ def test_the_command(folder: Path, log: Path, tmp_path: Path) -> None:
     assert answer["predicted"] == ["HELIOS_base"]
     assert answer["size"] == out.stat().st_size
     assert answer["events"]["kick"] > 50
-    assert unpack_page(out.read_text()).head["report"] is False
+    assert unpack_page(out.read_text()).head["home"] is None
     assert replay.read_text().startswith("RPL 2D 1\n")
     match_id = tc.read_match(log).match_id
     assert invoked("replay", match_id, "--store", folder / "store", "--out", out).strip() == str(out)

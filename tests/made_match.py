@@ -61,6 +61,14 @@ class MadeMatch:
         """A player stands there from a frame on."""
         self.players["x"][frame:, slot], self.players["y"][frame:, slot] = x, y
 
+    def turn(self) -> None:
+        """Both teams change ends and places."""
+        for columns, names in ((self.frames, ("ball_x", "ball_y")), (self.players, ("x", "y"))):
+            for name in names:
+                columns[name] *= -1
+        for name, values in self.players.items():
+            self.players[name] = np.roll(values, len(values[0]) // 2, axis=1)
+
     def events(self) -> Columns:
         """All events."""
         return find_events(self.frames, self.players, PARAMS)

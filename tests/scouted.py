@@ -3,58 +3,75 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from types import ModuleType
 
 from made_match import PARAMS, MadeMatch
 from teamclone.events.find import find_events
-from teamclone.logs import Match
+from teamclone.logs import Match, read_match
 from teamclone.logs.match import Columns
+from teamclone.plots.page import svg
+from teamclone.scout.findings import Findings
 from teamclone.scout.measures import Look, Looks
-from teamclone.scout.seen import Seen, _owned, _turned
+from teamclone.scout.seen import Seen
 from teamclone.scout.subject import Played, Subject
-from teamclone.world.view import view_columns
 
 
-def of_columns(frames: Columns, players: Columns, *, side: int, match_id: str = "made") -> Seen:
-    """A match as the team on a side sees it."""
-    events = find_events(frames, players, PARAMS)
-    return Seen(
-        match_id=match_id,
-        opponent="Them",
-        world=view_columns(frames, players, params=PARAMS, side=side),
-        events=_turned(events, side),
-        has=_owned(events, side, len(frames["cycle"])),
-        cycles=6000,
-    )
-
-
-def of_made(made: MadeMatch, *, side: int = 1) -> Seen:
+def of_made(made: MadeMatch, *, side: int = 1, types: Columns | None = None) -> Seen:
     """A made match, by default as the left team sees it."""
-    return of_columns(made.frames, made.players, side=side)
+    return Seen.of(made.frames, made.players, made.events(), side=side, types=types, params=PARAMS, match_id="made")
 
 
 def of_match(match: Match, *, side: int = 1, frames: slice = slice(None)) -> Seen:
     """Some frames of a match."""
     game = match.game
-    return of_columns(
-        {name: values[frames] for name, values in game.frames.items()},
-        {name: values[frames] for name, values in game.players.items()},
+    there, players = ({name: of[frames] for name, of in columns.items()} for columns in (game.frames, game.players))
+    return Seen.of(
+        there,
+        players,
+        find_events(there, players, game.server_params),
         side=side,
+        types=game.player_types,
+        params=game.server_params,
         match_id=match.match_id,
+        opponent="Them",
     )
+
+
+def both_sides(folder: Path, opponent: str, team: str = "HELIOS_base") -> list[tuple[Seen, Seen]]:
+    """The sample matches against an opponent, as the team and as its opponent see them."""
+    matches = [read_match(path) for path in sorted(folder.glob(f"*{opponent}*.rcg.xz"))]
+    sides = [1 if match.left.name == team else -1 for match in matches]
+    return [(of_match(match, side=s), of_match(match, side=-s)) for match, s in zip(matches, sides, strict=True)]
+
+
+def of_looks(
+    section: ModuleType, own: Sequence[Look], other: Sequence[Look] | None = None, opponents: Sequence[str] = ()
+) -> Subject:
+    """A team of which a section kept this; where nothing is said, the same of its opponents."""
+    names = opponents or ["Other"] * len(own)
+    played = [
+        Played(match_id=f"m{at}", started_at=None, opponent=name, side=1, score=(0, 0), complete=True)
+        for at, name in enumerate(names)
+    ]
+    kept = (Looks(looks, section.MEASURES) for looks in (own, own if other is None else other))
+    return Subject(team="Made {team}", played=played, own={section.KEY: next(kept)}, other={section.KEY: next(kept)})
 
 
 def subject_of(section: ModuleType, pairs: Sequence[tuple[Seen, Seen]]) -> Subject:
     """What a section keeps of matches, as the team and as its opponent see them."""
+    return of_looks(section, *([section.look(pair[at]) for pair in pairs] for at in (0, 1)))
 
-    def looks(at: int) -> Looks:
-        return Looks([section.look(pair[at]) for pair in pairs], section.MEASURES)
 
-    played = [
-        Played(match_id=own.match_id, started_at=None, opponent="Them", side=1, score=(0, 0), length=1.0, complete=True)
-        for own, _ in pairs
-    ]
-    return Subject(team="We", played=played, own={section.KEY: looks(0)}, other={section.KEY: looks(1)})
+def check_told(found: Findings, *, least: int) -> None:
+    """Sentences have all their numbers, pictures can be drawn, tables have their columns."""
+    texts = [one.text for one in found.claims]
+    assert len(texts) >= least
+    assert not any("{" in text or "nan" in text for text in texts)
+    for picture in found.pictures:
+        assert svg(picture.draw(), name=picture.name, alt=picture.alt).startswith("<svg")
+    for table in found.tables:
+        assert {len(row) for row in table.rows} <= {len(table.columns)}
 
 
 def share(look: Look, key: str) -> float:

@@ -11,13 +11,12 @@ from typing import Any
 from urllib.parse import unquote
 
 import pytest
-from typer.testing import CliRunner
 
 import teamclone as tc
 from chromium import CHROMIUM, browser
+from command import called
 from compared import TEAM, made_store, samples, variant
 from pages import unpack_page
-from teamclone.cli.app import app
 from teamclone.errors import UsageError
 from teamclone.evaluation import bootstrap
 from teamclone.logs import Match
@@ -48,14 +47,8 @@ def folder(matches: list[Match], tmp_path_factory: pytest.TempPathFactory) -> Pa
     made = tmp_path_factory.mktemp("scout")
     one, other, third, _ = matches
     made_store(made / "store", [one, other, variant(third, 0, opponent=HOSTILE)])
-    invoked("scout", made / "store", "--team", TEAM, "--out", made / "out" / "page.html", "--jobs", 1)
+    called("scout", made / "store", "--team", TEAM, "--out", made / "out" / "page.html", "--jobs", 1)
     return made
-
-
-def invoked(*arguments: object, code: int = 0) -> str:
-    result = CliRunner().invoke(app, [str(one) for one in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result.stdout
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +122,7 @@ def test_the_score_of_each_match_is_the_log_s(matches: list[Match], document: di
 
 def test_tables_as_csv_and_numbers_as_json(folder: Path, tmp_path: Path) -> None:
     arguments = ("scout", folder / "store", "--team", TEAM, "--opponent", "Cyrus2DBase", "--replays", 0, "--jobs", 1)
-    found = json.loads(invoked(*arguments, "--out", tmp_path / "a.html", "--csv", tmp_path / "csv", "--json"))
+    found = json.loads(called(*arguments, "--out", tmp_path / "a.html", "--csv", tmp_path / "csv", "--json").stdout)
     assert found["opponents"] == {"Cyrus2DBase": 2}
     assert [one["reason"] for one in found["left_out"]] == ["its opponent was not asked for"]
     assert not (tmp_path / "a-replays").exists()
@@ -142,7 +135,7 @@ def test_tables_as_csv_and_numbers_as_json(folder: Path, tmp_path: Path) -> None
 
 def test_one_match_says_that_it_is_one(folder: Path, tmp_path: Path) -> None:
     arguments = ("scout", folder / "store", "--team", TEAM, "--opponent", HOSTILE, "--replays", 0, "--jobs", 1)
-    text = invoked(*arguments, "--out", tmp_path / "a.html")
+    text = called(*arguments, "--out", tmp_path / "a.html").stdout
     assert "One match alone cannot tell a habit from chance" in text
     assert " to " not in text.splitlines()[1]
     assert "One match only" in (tmp_path / "a.html").read_text()
@@ -152,7 +145,7 @@ def test_what_changed_needs_two_sets(folder: Path, tmp_path: Path, matches: list
     earlier = made_store(tmp_path / "earlier", [variant(matches[0], at) for at in (0, 2, 4)])
     arguments = ("scout", folder / "store", "--team", TEAM, "--opponent", "Cyrus2DBase", "--replays", 0, "--jobs", 1)
     found = json.loads(
-        invoked(
+        called(
             *arguments,
             "--earlier",
             earlier.location,
@@ -161,7 +154,7 @@ def test_what_changed_needs_two_sets(folder: Path, tmp_path: Path, matches: list
             "--out",
             tmp_path / "a.html",
             "--json",
-        )
+        ).stdout
     )
     (changed,) = [one for one in found["sections"] if one["key"] == "changes"]
     assert changed["notes"][0].startswith("3 matches before and 2 since.")
@@ -173,7 +166,7 @@ def test_a_damaged_match_does_not_stop_the_others(matches: list[Match], tmp_path
     broken = store.match_ids()[0]
     (tmp_path / "store" / "matches" / broken / "player_states.parquet").write_bytes(b"nothing")
     out = tmp_path / "a.html"
-    invoked("scout", store.location, "--team", TEAM, "--replays", 0, "--out", out, "--jobs", 1, code=1)
+    called("scout", store.location, "--team", TEAM, "--replays", 0, "--out", out, "--jobs", 1, code=1)
     found = json.loads(out.with_suffix(".json").read_text())
     assert len(found["matches"]) == 1
     assert broken in found["failed"][0]

@@ -94,8 +94,8 @@ def compare(
     if names[0] == names[1] and twice:
         raise UsageError(f"match {min(twice)} is in both stores; expected matches of the original in one of them alone")
     samples = [
-        _sample(store, these, team=name, common=common, whose=work, telling=telling)
-        for store, these, name, work in zip((original, clone), matches, names, ("original", "clone"), strict=True)
+        _sample(store, these, common=common, whose=work, telling=telling)
+        for store, these, work in zip((original, clone), matches, ("original", "clone"), strict=True)
     ]
     groups = _groups(samples, common)
     failed = [text for sample in samples for text in sample.failed]
@@ -137,13 +137,9 @@ def write_comparison(comparison: Comparison, out: Path) -> None:
 # Which matches
 
 
-def _reason(match: TeamMatch, team: str) -> str | None:
+def _reason(match: TeamMatch) -> str | None:
     """Return why a match is left out, None if it is not."""
-    if match.opponent == team:
-        return "the team plays against itself"
-    if not match.opponent:
-        return "there is no opponent"
-    return None if match.row["complete"] else "its game log was not closed by the server"
+    return match.uncontested or (None if match.row["complete"] else "its game log was not closed by the server")
 
 
 def _common(
@@ -154,10 +150,7 @@ def _common(
     Raises:
         UsageError: there is none, or one that is wanted is not among them.
     """
-    there = [
-        {str(one.opponent) for one in these if one.error is None and _reason(one, name) is None}
-        for these, name in zip(matches, names, strict=True)
-    ]
+    there = [{str(one.opponent) for one in these if one.error is None and _reason(one) is None} for these in matches]
     common = sorted(there[0] & there[1])
     if not common:
         told = "; ".join(
@@ -172,7 +165,7 @@ def _common(
 
 
 def _sample(
-    store: Store, matches: list[TeamMatch], *, team: str, common: Collection[str], whose: str, telling: Progress
+    store: Store, matches: list[TeamMatch], *, common: Collection[str], whose: str, telling: Progress
 ) -> _Sample:
     made = _Sample(profiles=[], left_out=[], failed=[])
     for done, match in enumerate(matches):
@@ -180,7 +173,7 @@ def _sample(
         if match.error is not None:
             made.failed.append(match.error)
             continue
-        if why := _reason(match, team) or (None if match.opponent in common else "its opponent is not compared"):
+        if why := _reason(match) or (None if match.opponent in common else "its opponent is not compared"):
             made.left_out.append(
                 {"whose": whose, "match_id": match.match_id, "opponent": match.opponent or "", "reason": why}
             )

@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
 from teamclone.comparison import figures, words
 from teamclone.comparison.profile import POSITIONS, SPEEDS
 from teamclone.evaluation import bootstrap
-from teamclone.plots.page import svg
+from teamclone.plots.page import page_template, svg
 from teamclone.plots.style import page_css
 
 
 def render(document: Mapping[str, Any]) -> str:
     """Return the page of a comparison, from its document."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    template = page_template(
+        __package__,
+        "comparison.html.j2",
+        name=words.name_of,
+        label=words.label_of,
+        amount=words.amount,
+        interval=lambda figure, unit: _stacked(words.with_interval(figure, unit)),
+        units=lambda row: _stacked(words.units(row)),
     )
-    environment.filters |= {
-        "name": words.name_of,
-        "label": words.label_of,
-        "amount": words.amount,
-        "interval": lambda figure, unit: _stacked(words.with_interval(figure, unit)),
-        "units": lambda row: _stacked(words.units(row)),
-    }
-    template = environment.from_string(resources.files(__package__).joinpath("comparison.html.j2").read_text("utf-8"))
     return template.render(
         document=document,
         groups=document["groups"],

@@ -1,4 +1,4 @@
-"""Figures inside a page: SVG text that takes its colours from the page around it, light or dark.
+"""The template of a page, and figures inside it: SVG text that takes its colours from the page, light or dark.
 
 matplotlib knows no CSS, so figures are drawn in stand-in colours that `svg` replaces by CSS variables.
 """
@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable
+from importlib import resources
+from typing import Any
 
+import jinja2
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
@@ -26,6 +30,15 @@ WIDTH = 7.4
 
 COLOURS = Colours(paper=PAPER, ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, second=SECOND)
 STYLE = style(COLOURS)
+
+
+def page_template(package: str, name: str, /, **filters: Callable[..., Any]) -> jinja2.Template:
+    """Return the template of a page out of a package, with filters of its own; what it shows is escaped."""
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= filters
+    return environment.from_string(resources.files(package).joinpath(name).read_text("utf-8"))
 
 
 def svg(figure: Figure, *, name: str, alt: str) -> str:

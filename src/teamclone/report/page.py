@@ -6,7 +6,6 @@ import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -21,7 +20,7 @@ from teamclone.evaluation.evaluate import evaluate_and_save, load_evaluation
 from teamclone.evaluation.latency import load_bench, measure_run
 from teamclone.models.clone import model_id
 from teamclone.models.config import EgocentricPointConfig, PaperConfig
-from teamclone.plots.page import svg
+from teamclone.plots.page import page_template, svg
 from teamclone.plots.style import page_css
 from teamclone.report import figures
 from teamclone.rollouts.files import load_rollouts
@@ -459,11 +458,9 @@ def render(
         ahead: from `fresh_rollouts`; None leaves the roll-outs out.
         replays, scouts: pages of these commands, from `pages_of`.
     """
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    template = page_template(
+        __package__, "report.html.j2", percent=percent, number=number, figure=figure, points=points
     )
-    environment.filters |= {"percent": percent, "number": number, "figure": figure, "points": points}
-    template = environment.from_string(resources.files(__package__).joinpath("report.html.j2").read_text("utf-8"))
     name = primary_split(evaluation)
     section = evaluation["splits"][name]
     support = [sum(row) for row in section["confusion"]]

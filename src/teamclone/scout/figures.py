@@ -15,7 +15,7 @@ from teamclone.plots.maps import draw_formation, draw_zones
 from teamclone.plots.page import ACCENT, COLOURS, MUTED, SECOND, STYLE, WIDTH
 from teamclone.plots.pitch import draw_pitch
 from teamclone.rcss.players import N_TEAM
-from teamclone.scout.measures import ratio
+from teamclone.scout.measures import ratio, wilson
 
 Floats = NDArray[np.floating[Any]]
 Bools = NDArray[np.bool_]
@@ -26,23 +26,6 @@ GROUPS = 5
 UNUMS = range(1, N_TEAM + 1)
 RATIOS = (0.2, 1.0)
 """Ratios of a zone without any colour and with the strongest one."""
-
-
-CELL_M = 8.0
-"""Ways that begin in one square of this size and end in one are one route."""
-ROUTES = 20
-"""Routes that are drawn, those that are taken most."""
-
-
-def routes_taken(start: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the ways (n, 2) that are taken most, from where to where, and how often: means of ways of equal cells."""
-    ways = np.concatenate([start, end], axis=1).reshape(-1, 4)
-    ways = ways[np.isfinite(ways).all(axis=1)]
-    cells, of = np.unique((ways // CELL_M).astype(np.int64), axis=0, return_inverse=True)
-    taken = np.bincount(of.ravel(), minlength=len(cells)).astype(np.float64)
-    most = np.argsort(-taken, kind="stable")[:ROUTES]
-    means = np.array([ways[of.ravel() == cell].mean(0) for cell in most]).reshape(-1, 4)
-    return means[:, :2], means[:, 2:], taken[most]
 
 
 @mpl.rc_context(STYLE)
@@ -101,14 +84,6 @@ def reliability_bins(expected: Floats, scored: Bools) -> list[Bin]:
         low, high = wilson(share, n)
         made.append((float(expected[these].mean()), share, low, high, n))
     return made
-
-
-def wilson(share: float, n: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share of n draws (Wilson 1927)."""
-    z = 1.96
-    middle = (share + z * z / (2 * n)) / (1 + z * z / n)
-    half = z / (1 + z * z / n) * float(np.sqrt(share * (1 - share) / n + z * z / (4 * n * n)))
-    return middle - half, middle + half
 
 
 @mpl.rc_context(STYLE)

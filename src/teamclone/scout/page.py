@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import resources
 
-import jinja2
 from markupsafe import Markup, escape
 
 from teamclone.comparison.words import NOTHING
 from teamclone.evaluation import bootstrap
-from teamclone.plots.page import svg
+from teamclone.plots.page import page_template, svg
 from teamclone.plots.style import page_css
 from teamclone.scout.findings import PLACE, Claim, Picture, number, rounded
 from teamclone.scout.measures import Moment
@@ -24,11 +22,7 @@ def render(report: Report, *, link: Callable[[Moment], str | None], report_page:
         link: gives the address of a moment in a replay; None where there is none.
         report_page: address of the page about the clone; None where there is none.
     """
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"claim": _claim, "picture": _picture, "cell": _cell, "link": link}
-    template = environment.from_string(resources.files(__package__).joinpath("scout.html.j2").read_text("utf-8"))
+    template = page_template(__package__, "scout.html.j2", claim=_claim, picture=_picture, cell=_cell, link=link)
     return template.render(
         document=report.document,
         subject=report.subject,

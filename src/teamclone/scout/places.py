@@ -51,20 +51,28 @@ def to_goal(x: Floats, y: Floats) -> Floats:
     return found
 
 
-def counted(x: Floats, y: Floats, weight: Floats | None = None, grid: tuple[int, int] = GRID) -> Floats:
-    """Return how many places (n,) lie in each zone of a grid over the pitch, (along, across); beyond it, the edge's."""
+def summed(places: Floats) -> Floats:
+    """Return (m, 3) sums of the places of m players in n frames (n, m, 2), and in how many they are known."""
+    there: Bools = np.all(np.isfinite(places), axis=-1)
+    found: Floats = np.concatenate([np.where(there[..., None], places, 0).sum(0), there.sum(0)[:, None]], axis=1)
+    return found
+
+
+def mean_of(sums: Floats) -> Floats:
+    """Return the mean places (m, 2) of `summed` ones; NaN where none is known."""
+    with np.errstate(invalid="ignore"):
+        found: Floats = sums[:, :2] / sums[:, 2:]
+    return found
+
+
+def counted(x: Floats, y: Floats, weight: Floats | None = None) -> Floats:
+    """Return how many places (n,), or which sum of weights (n,), lie in each zone of GRID; beyond it, the edge's."""
     there = np.isfinite(x) & np.isfinite(y)
     along, across = (
         np.clip(((value[there] / size + 0.5) * n).astype(np.int64), 0, n - 1)
-        for value, size, n in ((x, pitch.LENGTH, grid[0]), (y, pitch.WIDTH, grid[1]))
+        for value, size, n in zip((x, y), (pitch.LENGTH, pitch.WIDTH), GRID, strict=True)
     )
-    found: Floats = (
-        np.bincount(
-            along * grid[1] + across,
-            weights=None if weight is None else weight[there],
-            minlength=grid[0] * grid[1],
-        )
-        .reshape(grid)
-        .astype(np.float64)
-    )
+    weights = None if weight is None else weight[there]
+    counts = np.bincount(along * GRID[1] + across, weights=weights, minlength=GRID[0] * GRID[1])
+    found: Floats = counts.reshape(GRID).astype(np.float64)
     return found

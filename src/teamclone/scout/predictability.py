@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.scout.figures import wilson
-from teamclone.scout.measures import Figure, ratio
+from teamclone.scout.measures import Figure, ratio, wilson
 
 Floats = NDArray[np.floating[Any]]
 Bools = NDArray[np.bool_]

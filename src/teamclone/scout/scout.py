@@ -183,20 +183,18 @@ def _chosen(
     for one in sorted(found, key=lambda match: (_started(match), match.match_id)):
         if one.error is not None:
             continue
-        if reason := _reason(one, team, opponents):
+        if reason := _reason(one, opponents):
             left_out.append({"match_id": one.match_id, "opponent": one.opponent or "", "reason": reason})
         else:
             chosen.append(one)
     return chosen
 
 
-def _reason(match: TeamMatch, team: str, opponents: Collection[str]) -> str | None:
+def _reason(match: TeamMatch, opponents: Collection[str]) -> str | None:
     """Return why a match does not count, None if it does."""
-    if match.opponent == team:
-        return "the team plays against itself"
-    if not match.opponent:
-        return "there is no opponent"
-    return "its opponent was not asked for" if opponents and match.opponent not in opponents else None
+    return match.uncontested or (
+        "its opponent was not asked for" if opponents and match.opponent not in opponents else None
+    )
 
 
 def _split(matches: Sequence[TeamMatch], since: str | None) -> tuple[list[TeamMatch], list[TeamMatch]]:
@@ -255,7 +253,6 @@ def _watch(location: str, match: TeamMatch) -> _Watched | str:
             opponent=str(match.opponent),
             side=match.side,
             score=(left, right) if match.side > 0 else (right, left),
-            length=own.length,
             complete=bool(match.row["complete"]),
         ),
         own={section.KEY: section.look(own) for section in SECTIONS},

@@ -16,7 +16,6 @@ from teamclone.rcss import server_params
 from teamclone.rcss.player_types import FIELDS
 from teamclone.rcss.players import TEAM_SLOTS
 from teamclone.rcss.playmodes import PlayMode
-from teamclone.scout.measures import Moment
 from teamclone.store import schema
 from teamclone.store.events import read_events
 from teamclone.store.of_team import TeamMatch
@@ -42,6 +41,8 @@ class Seen:
         world: all frames.
         events: columns of ``events.definitions``, places turned into the team's frame, with ``own`` (n_events,) bool
             whether an event is the team's and ``other_own`` whether the other player that it is about is.
+        goalies: (n_frames, 22) who keeps a goal. The one that may catch, unless a teammate stands far behind: players
+            that connect in an unusual order make another one than they mean the server's goalkeeper.
         has: (n_frames,) 1 where the team has the ball in play_on, -1 where the opponent has it, else 0.
         cycles: of a match of full length, both halves.
     """
@@ -50,6 +51,7 @@ class Seen:
     opponent: str
     world: World
     events: Columns
+    goalies: Bools
     has: NDArray[np.int8]
     cycles: float
 
@@ -72,10 +74,12 @@ class Seen:
             frames, players, types, params: as ``world.view.view_columns`` takes them.
             events: ``events.definitions.COLUMNS`` of the match.
         """
+        world = view_columns(frames, players, types=types, params=params, side=side)
         return cls(
             match_id=match_id,
             opponent=opponent,
-            world=view_columns(frames, players, types=types, params=params, side=side),
+            world=world,
+            goalies=_goalies(world),
             events=_turned(events, side),
             has=_owned(events, side, len(frames["cycle"])),
             cycles=2 * server_params.half_cycles(params, version=server_params.OLDEST),
@@ -107,33 +111,12 @@ class Seen:
     @property
     def on_field(self) -> Bools:
         """(n_frames, 22) who is on the field."""
-        return self._flag(FLAG_ON_FIELD)
+        return _flag(self.world, FLAG_ON_FIELD)
 
     @property
     def gloves(self) -> Bools:
         """(n_frames, 22) who may catch the ball: the goalkeeper that the server knows."""
-        return self._flag(FLAG_GOALIE)
-
-    @property
-    def goalies(self) -> Bools:
-        """(n_frames, 22) who keeps a goal.
-
-        The one that may catch, unless a teammate stands far behind: players that connect in an unusual order make
-        another one than they mean the server's goalkeeper.
-        """
-        named = self.gloves
-        for team, behind in zip(TEAM_SLOTS, (1.0, -1.0), strict=True):
-            x = behind * self.world.channel("x")[:, team].astype(np.float64)
-            playing = self.on_field[:, team] & self.play_on[:, None] & np.isfinite(x)
-            keeps = named[:, team] & playing
-            other = playing & ~keeps.any(0)
-            if keeps.any() and other.any():
-                mean = np.where(other, x, 0).sum(0) / np.maximum(other.sum(0), 1)
-                hindmost = int(np.where(other.any(0), mean, np.inf).argmin())
-                if mean[hindmost] < x[keeps].mean() - BEHIND_M:
-                    named[:, team] = False
-                    named[:, team.start + hindmost] = self.on_field[:, team.start + hindmost]
-        return named
+        return _flag(self.world, FLAG_GOALIE)
 
     @property
     def outfield(self) -> NDArray[np.float32]:
@@ -151,10 +134,6 @@ class Seen:
         if outcomes:
             these &= np.isin(self.events["outcome"], [str(one) for one in outcomes])
         return {name: values[these] for name, values in self.events.items()}
-
-    def _flag(self, flag: int) -> Bools:
-        found: Bools = (np.nan_to_num(self.world.channel("flags")).astype(np.int64) & flag) != 0
-        return found
 
 
 def see(store: Store, match: TeamMatch) -> tuple[Seen, Seen]:
@@ -187,17 +166,27 @@ def see(store: Store, match: TeamMatch) -> tuple[Seen, Seen]:
     return of(match.side), of(-match.side)
 
 
-def moment(seen: Seen, frame: int, *, unum: int = 0, own: bool = True, text: str = "", weight: float = 1.0) -> Moment:
-    """Return a frame of a match as a moment to show; the text is what happens."""
-    return Moment(
-        match_id=seen.match_id,
-        cycle=int(seen.world.cycle[frame]),
-        stoppage=int(seen.world.stoppage[frame]),
-        unum=unum,
-        own=own,
-        text=text,
-        weight=weight,
-    )
+def _flag(world: World, flag: int) -> Bools:
+    found: Bools = (np.nan_to_num(world.channel("flags")).astype(np.int64) & flag) != 0
+    return found
+
+
+def _goalies(world: World) -> Bools:
+    """Return (n_frames, 22) who keeps a goal, see `Seen`."""
+    named, on_field = _flag(world, FLAG_GOALIE), _flag(world, FLAG_ON_FIELD)
+    play_on = (world.mode == PlayMode.PLAY_ON)[:, None]
+    for team, behind in zip(TEAM_SLOTS, (1.0, -1.0), strict=True):
+        x = behind * world.channel("x")[:, team].astype(np.float64)
+        playing = on_field[:, team] & play_on & np.isfinite(x)
+        keeps = named[:, team] & playing
+        other = playing & ~keeps.any(0)
+        if keeps.any() and other.any():
+            mean = np.where(other, x, 0).sum(0) / np.maximum(other.sum(0), 1)
+            hindmost = int(np.where(other.any(0), mean, np.inf).argmin())
+            if mean[hindmost] < x[keeps].mean() - BEHIND_M:
+                named[:, team] = False
+                named[:, team.start + hindmost] = on_field[:, team.start + hindmost]
+    return named
 
 
 def _turned(events: Columns, side: int) -> Columns:

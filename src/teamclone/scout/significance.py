@@ -51,13 +51,12 @@ def permuted(before: tuple[Floats, Floats], since: tuple[Floats, Floats], strata
 
 def discoveries(p_values: Sequence[float]) -> Floats:
     """Return p-values corrected for their number (Benjamini and Hochberg 1995), NaN where one is."""
-    values = np.array(p_values, float)
-    corrected = np.full(len(values), np.nan)
-    known = np.flatnonzero(np.isfinite(values))
-    order = known[np.argsort(values[known], kind="stable")]
-    if len(order):
-        scaled = values[order] * len(order) / np.arange(1, len(order) + 1)
-        corrected[order] = np.minimum(np.minimum.accumulate(scaled[::-1])[::-1], 1.0)
+    from scipy.stats import false_discovery_control
+
+    corrected = np.array(p_values, float)
+    known = np.isfinite(corrected)
+    if known.any():
+        corrected[known] = false_discovery_control(corrected[known])
     return corrected
 
 

@@ -16,7 +16,7 @@ class Played:
         started_at: local time of the server's start as ISO text; None if the log has none.
         side: of the team, 1 left or -1 right.
         score: goals of the team and of the opponent.
-        length: share of a whole match that the log holds. complete: the server closed its log.
+        complete: the server closed its log.
     """
 
     match_id: str
@@ -24,7 +24,6 @@ class Played:
     opponent: str
     side: int
     score: tuple[int, int]
-    length: float
     complete: bool
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from teamclone.scout.measures import Look, Moment
-from teamclone.scout.seen import Bools, Ints, Seen
+from teamclone.scout.seen import Bools, Floats, Ints, Seen
 
 AnyInts = NDArray[np.integer[Any]]
+
+MOST_MOMENTS = 4
+"""Of a kind that are kept of a match: more than are shown of all."""
 
 
 def until(seen: Seen, frames: AnyInts, cycles: int) -> Ints:
@@ -30,17 +34,31 @@ def followed(frames: AnyInts, start: AnyInts, end: AnyInts) -> Bools:
 
 
 def moment(seen: Seen, frame: int, text: str, *, unum: int = 0, own: bool = True, weight: float = 1.0) -> Moment:
-    """Return a frame as a moment to look at; its text is what happens, the cycle is added."""
-    cycle = int(seen.world.cycle[frame])
+    """Return a frame as a moment to look at; its text is what happens."""
     return Moment(
         match_id=seen.match_id,
-        cycle=cycle,
+        cycle=int(seen.world.cycle[frame]),
         stoppage=int(seen.world.stoppage[frame]),
         unum=int(unum),
         own=own,
         text=text,
         weight=float(weight),
     )
+
+
+def foremost(
+    seen: Seen, frame: AnyInts, unum: AnyInts, weight: Floats, text: Callable[[int], str], *, own: bool = True
+) -> list[Moment]:
+    """Return those of some frames with the greatest weight as moments, at most MOST_MOMENTS.
+
+    Args:
+        frame, unum, weight: (n,) of each. text: what happens in the one of this index.
+        own: it is the team's.
+    """
+    return [
+        moment(seen, int(frame[at]), text(int(at)), unum=unum[at], own=own, weight=weight[at])
+        for at in np.argsort(-weight, kind="stable")[:MOST_MOMENTS]
+    ]
 
 
 def who(unum: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from urllib.parse import quote
 
@@ -95,18 +95,18 @@ def _tables(report: Report, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for chapter in report.chapters:
         for table in chapter.findings.tables:
-            text = io.StringIO()
-            writer = csv.writer(text, lineterminator="\n")
-            writer.writerow(table.columns)
-            writer.writerows(table.rows)
-            write_atomic(folder / f"{chapter.key}-{table.name}.csv", text.getvalue().encode())
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+            _rows(folder / f"{chapter.key}-{table.name}.csv", [table.columns, *table.rows])
     ends = ("value", "low", "high", "matches")
     names = ("key", "section", "name", "unit", "about")
-    writer.writerow([*names, *ends, *(f"opponents_{end}" for end in ends)])
-    for one in report.document["measures"]:
-        writer.writerow(
-            [*(one[name] for name in names), *(one[of][end] for of in ("team", "opponents") for end in ends)]
-        )
-    write_atomic(folder / "measures.csv", text.getvalue().encode())
+    head = [*names, *ends, *(f"opponents_{end}" for end in ends)]
+    measures = [
+        [*(one[name] for name in names), *(one[of][end] for of in ("team", "opponents") for end in ends)]
+        for one in report.document["measures"]
+    ]
+    _rows(folder / "measures.csv", [head, *measures])
+
+
+def _rows(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    write_atomic(path, text.getvalue().encode())

@@ -29,6 +29,13 @@ class TeamMatch:
     opponent: str | None = None
     error: str | None = None
 
+    @property
+    def uncontested(self) -> str | None:
+        """Why it says nothing of the team against others; None if it does."""
+        if not self.opponent:
+            return "there is no opponent"
+        return "the team plays against itself" if self.row["left_name"] == self.row["right_name"] else None
+
 
 def matches_of(store: Store, team: str) -> list[TeamMatch]:
     """Return the matches of a team, and those of which nothing can be read, by id.

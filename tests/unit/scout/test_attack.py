@@ -7,24 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from made_match import LEFT_2, LEFT_7, LEFT_9, PARAMS, RIGHT_4, MadeMatch
+from made_match import LEFT_2, LEFT_7, LEFT_9, RIGHT_4, MadeMatch
+from scouted import of_made, of_match
 from teamclone.events.find import find_events
 from teamclone.logs import Match, read_match
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.scout.measures import Look
 from teamclone.scout.sections import attack, identity
 from teamclone.scout.seen import Seen
-
-
-def seen_of(match: Match, side: int) -> Seen:
-    params = match.game.server_params
-    events = find_events(match.frames, match.players, params)
-    types = match.game.player_types
-    return Seen.of(match.frames, match.players, events, side=side, types=types, params=params)
-
-
-def made(match: MadeMatch, side: int = 1) -> Seen:
-    return Seen.of(match.frames, match.players, match.events(), side=side, params=PARAMS)
 
 
 def passing() -> MadeMatch:
@@ -44,7 +34,7 @@ def passing() -> MadeMatch:
 
 
 def test_progressive_passes_and_entries_by_hand() -> None:
-    look = attack.look(made(passing()))
+    look = attack.look(of_made(passing()))
     assert look.numbers["progressive"][0] == 2
     assert look.numbers["entries"][0] == 1
     assert [look.numbers[f"entries_{lane}"] for lane in ("left", "centre", "right")] == [(1, 1), (0, 1), (0, 1)]
@@ -58,13 +48,8 @@ def test_progressive_passes_and_entries_by_hand() -> None:
 
 def test_the_other_team_sees_it_turned() -> None:
     match = passing()
-    match.frames["ball_x"] *= -1
-    match.frames["ball_y"] *= -1
-    for name in ("x", "y"):
-        match.players[name] *= -1
-    for name, values in match.players.items():
-        match.players[name] = np.roll(values, 11, axis=1)
-    one, other = attack.look(made(passing())), attack.look(made(match, side=-1))
+    match.turn()
+    one, other = attack.look(of_made(passing())), attack.look(of_made(match, side=-1))
     assert one.numbers == other.numbers
     for name, values in one.arrays.items():
         np.testing.assert_array_equal(values, other.arrays[name], err_msg=name)
@@ -77,7 +62,7 @@ def match(samples_dir: Path) -> Match:
 
 @pytest.fixture(scope="module")
 def seen(match: Match) -> Seen:
-    return seen_of(match, -1)
+    return of_match(match, side=-1)
 
 
 def test_counts_are_those_of_the_events(match: Match, seen: Seen) -> None:
@@ -123,7 +108,7 @@ def test_who_has_the_ball_is_what_the_statistics_say(match: Match, seen: Seen) -
 
 def test_nothing_happens_and_nothing_breaks() -> None:
     for frames in (1, 5):
-        empty = made(MadeMatch(frames))
+        empty = of_made(MadeMatch(frames))
         for section in (identity, attack):
             look = section.look(empty)
             assert isinstance(look, Look)
@@ -134,4 +119,4 @@ def test_nothing_happens_and_nothing_breaks() -> None:
     nowhere.players["state"][:] = 0
     nowhere.frames["ball_x"][:] = np.nan
     for section in (identity, attack):
-        assert isinstance(section.look(made(nowhere)), Look)
+        assert isinstance(section.look(of_made(nowhere)), Look)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from made_match import LEFT_1, LEFT_7, LEFT_9, RIGHT_1, RIGHT_4, RIGHT_9, MadeMatch
-from scouted import of_made, of_match, share, subject_of
+from scouted import both_sides, check_told, of_made, of_match, share, subject_of
 from teamclone.logs import read_match
-from teamclone.plots.page import svg
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.scout.sections import defence, pressing
@@ -127,17 +126,8 @@ def test_marking_counted_once_more_by_walking(samples_dir: Path) -> None:
 
 
 def test_what_is_told_of_real_matches(samples_dir: Path) -> None:
-    matches = [read_match(path) for path in sorted(samples_dir.glob("*YuShan2024*.rcg.xz"))]
-    sides = [1 if match.game.left.name == "HELIOS_base" else -1 for match in matches]
-    pairs = [(of_match(m, side=side), of_match(m, side=-side)) for m, side in zip(matches, sides, strict=True)]
-    found = defence.tell(subject_of(defence, pairs))
-    texts = [one.text for one in found.claims]
-    assert len(texts) >= 5
-    assert not any("{" in text or "nan" in text for text in texts)
-    for picture in found.pictures:
-        assert svg(picture.draw(), name=picture.name, alt=picture.alt).startswith("<svg")
-    for table in found.tables:
-        assert {len(row) for row in table.rows} <= {len(table.columns)}
+    found = defence.tell(subject_of(defence, both_sides(samples_dir, "YuShan2024")))
+    check_told(found, least=5)
 
 
 def hostile() -> dict[str, MadeMatch]:

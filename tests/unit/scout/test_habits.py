@@ -7,31 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from made_match import LEFT_1, LEFT_7, LEFT_9, PARAMS, RIGHT_4, MadeMatch
+from made_match import LEFT_1, LEFT_7, LEFT_9, RIGHT_4, MadeMatch
+from scouted import of_looks, of_made
 from teamclone.events.definitions import EventKind
 from teamclone.events.find import find_events
 from teamclone.logs import Match, read_match
 from teamclone.rcss.playmodes import RESTARTS, PlayMode
 from teamclone.scout.decisions import CLEARANCE, DRIBBLE, HOLD, LOST_PASS, SHOT, decisions
 from teamclone.scout.distribution import NOBODY, RESTART_KINDS, keeper, restarts
-from teamclone.scout.measures import Look, Looks
 from teamclone.scout.sections import habits
 from teamclone.scout.seen import Seen
-from teamclone.scout.subject import Played, Subject
-
-
-def seen_of(match: MadeMatch, side: int = 1) -> Seen:
-    return Seen.of(match.frames, match.players, match.events(), side=side, params=PARAMS, match_id="made")
-
-
-def subject_of(looks: list[Look], opponents: list[str] | None = None) -> Subject:
-    names = opponents or ["Other"] * len(looks)
-    played = [
-        Played(match_id=f"m{at}", started_at=None, opponent=name, side=1, score=(0, 0), length=1.0, complete=True)
-        for at, name in enumerate(names)
-    ]
-    own, other = ({habits.KEY: Looks(looks, habits.MEASURES)} for _ in range(2))
-    return Subject(team="Made {team}", played=played, own=own, other=other)
 
 
 def passing() -> MadeMatch:
@@ -55,7 +40,7 @@ def passing() -> MadeMatch:
 
 
 def test_decisions_by_hand() -> None:
-    made = decisions(seen_of(passing()))
+    made = decisions(of_made(passing()))
     assert made.frame.tolist() == [2, 12, 20]
     assert made.answer.tolist() == [8, DRIBBLE, LOST_PASS]
     number, third, lane, pressed = made.cell.tolist()
@@ -70,33 +55,28 @@ def test_decisions_by_hand() -> None:
 def test_an_opponent_within_five_metres_presses() -> None:
     match = passing()
     match.stand(RIGHT_4, 4, -27)
-    assert decisions(seen_of(match)).cell[3].tolist() == [1, 0, 0]
+    assert decisions(of_made(match)).cell[3].tolist() == [1, 0, 0]
     match.players["state"][:6, RIGHT_4] = 0
-    assert decisions(seen_of(match)).cell[3].tolist() == [0, 0, 0]
+    assert decisions(of_made(match)).cell[3].tolist() == [0, 0, 0]
 
 
 def test_kicks_without_a_dash_for_long_are_holding() -> None:
     match = passing()
     for frame in (4, 8):
         match.kick(frame, LEFT_7)
-    assert decisions(seen_of(match)).answer.tolist()[0] == 8
+    assert decisions(of_made(match)).answer.tolist()[0] == 8
     match = passing()
     match.ball(14, 0, -30)
     for frame in (8, 14):
         match.kick(frame, LEFT_7)
     match.players["state"][13, LEFT_9] = 1
-    assert decisions(seen_of(match)).answer.tolist()[0] == HOLD
+    assert decisions(of_made(match)).answer.tolist()[0] == HOLD
 
 
 def test_the_other_team_sees_it_turned() -> None:
     match = passing()
-    match.frames["ball_x"] *= -1
-    match.frames["ball_y"] *= -1
-    for name in ("x", "y"):
-        match.players[name] *= -1
-    for name, values in match.players.items():
-        match.players[name] = np.roll(values, 11, axis=1)
-    one, other = habits.look(seen_of(passing())), habits.look(seen_of(match, side=-1))
+    match.turn()
+    one, other = habits.look(of_made(passing())), habits.look(of_made(match, side=-1))
     assert one.numbers == other.numbers
     for name, values in one.arrays.items():
         np.testing.assert_array_equal(values, other.arrays[name], err_msg=name)
@@ -115,11 +95,11 @@ def kick_in() -> MadeMatch:
 
 
 def test_a_restart_by_hand() -> None:
-    counts, when = restarts(seen_of(kick_in()))
+    counts, when = restarts(of_made(kick_in()))
     kind = [name for _, name, _ in RESTART_KINDS].index("kick-in")
     assert counts.sum() == counts[kind, 0, 6, 8] == 1
     assert when[kind, 0, 6, 8].tolist() == [103, 0]
-    assert restarts(seen_of(kick_in(), side=-1))[0].sum() == 0
+    assert restarts(of_made(kick_in(), side=-1))[0].sum() == 0
 
 
 def test_balls_of_the_goalkeeper_by_hand() -> None:
@@ -130,9 +110,9 @@ def test_balls_of_the_goalkeeper_by_hand() -> None:
     match.kick(2, LEFT_1)
     match.ball(14, -10, 20)
     match.kick(14, LEFT_7)
-    found = keeper(seen_of(match))
+    found = keeper(of_made(match))
     assert found == {"long": (1, 1), "lost": (0, 1), "left": (0, 1), "right": (1, 1)}
-    assert set(keeper(seen_of(match, side=-1)).values()) == {(0, 0)}
+    assert set(keeper(of_made(match, side=-1)).values()) == {(0, 0)}
 
 
 @pytest.fixture(scope="module")
@@ -192,10 +172,10 @@ def test_restarts_are_those_of_the_log(match: Match, seen: Seen) -> None:
 def test_it_tells_habits_with_moments_of_shown_matches() -> None:
     looks = []
     for at in range(4):
-        look = habits.look(seen_of(passing()))
+        look = habits.look(of_made(passing()))
         look.arrays["counts"][6, 1, 0, 0, 8] += 9 + at
         looks.append(look)
-    subject = subject_of(looks)
+    subject = of_looks(habits, looks)
     subject.own[habits.KEY].shown = frozenset({"m1", "m3"})
     findings = habits.tell(subject)
     (habit,) = (one for one in findings.claims if "7 passes to 9" in one.text)
@@ -213,7 +193,7 @@ def test_it_tells_habits_with_moments_of_shown_matches() -> None:
 
 def test_a_real_match_alone_can_be_told(seen: Seen) -> None:
     look = habits.look(seen)
-    alone, twice = (habits.tell(subject_of([look] * n)) for n in (1, 2))
+    alone, twice = (habits.tell(of_looks(habits, [look] * n)) for n in (1, 2))
     # Nothing is foreseen of the only match; two tell of each other.
     assert "foreseen" not in {one.name for one in alone.pictures}
     assert "foreseen" in {one.name for one in twice.pictures}
@@ -230,6 +210,6 @@ def test_nothing_happens_and_nothing_breaks() -> None:
     lost = passing()
     lost.frames["ball_y"][:] = np.nan
     for match in (MadeMatch(1), nowhere, lost):
-        look = habits.look(seen_of(match))
+        look = habits.look(of_made(match))
         assert not look.arrays["counts"].any()
-        assert habits.tell(subject_of([look])).notes
+        assert habits.tell(of_looks(habits, [look])).notes

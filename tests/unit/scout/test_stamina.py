@@ -8,19 +8,14 @@ import numpy as np
 import pytest
 
 from made_match import PARAMS, MadeMatch
+from scouted import of_looks, of_made
 from teamclone.events.find import find_events
 from teamclone.logs import Match, read_match
-from teamclone.logs.match import Columns, default_player_types
+from teamclone.logs.match import default_player_types
 from teamclone.rcss import state_bits
 from teamclone.rcss.playmodes import PlayMode
-from teamclone.scout.measures import Look, Looks
 from teamclone.scout.sections import stamina
 from teamclone.scout.seen import Seen
-from teamclone.scout.subject import Played, Subject
-
-
-def seen_of(match: MadeMatch, types: Columns | None = None, side: int = 1) -> Seen:
-    return Seen.of(match.frames, match.players, match.events(), side=side, types=types, params=PARAMS, match_id="made")
 
 
 def tired() -> MadeMatch:
@@ -35,17 +30,8 @@ def tired() -> MadeMatch:
     return match
 
 
-def subject_of(*looks: Look) -> Subject:
-    played = [
-        Played(match_id=str(at), started_at=None, opponent="Other", side=1, score=(0, 0), length=1.0, complete=True)
-        for at in range(len(looks))
-    ]
-    both = {stamina.KEY: Looks(looks, stamina.MEASURES)}
-    return Subject(team="Made", played=played, own=both, other={stamina.KEY: Looks(looks, stamina.MEASURES)})
-
-
 def test_tired_players_by_hand() -> None:
-    look = stamina.look(seen_of(tired()))
+    look = stamina.look(of_made(tired()))
     assert look.numbers["stamina_empty_first"] == (30, 200)
     assert look.numbers["stamina_empty_second"] == (0, 0)
     # The hindmost four field players are 2 to 5.
@@ -62,16 +48,16 @@ def test_tired_players_by_hand() -> None:
 
 def test_pace_is_of_field_players_in_consecutive_cycles_of_play() -> None:
     match = tired()
-    assert stamina.look(seen_of(match)).numbers["stamina_pace_late"] == (pytest.approx(19 * 0.5), 190)
+    assert stamina.look(of_made(match)).numbers["stamina_pace_late"] == (pytest.approx(19 * 0.5), 190)
     match.mode(10, PlayMode.KICK_IN_L)
-    assert stamina.look(seen_of(match)).numbers["stamina_pace_late"] == (pytest.approx(9 * 0.5), 90)
+    assert stamina.look(of_made(match)).numbers["stamina_pace_late"] == (pytest.approx(9 * 0.5), 90)
     match = tired()
     match.frames["cycle"][10:] += 5
-    assert stamina.look(seen_of(match)).numbers["stamina_pace_late"] == (pytest.approx(18 * 0.5), 180)
+    assert stamina.look(of_made(match)).numbers["stamina_pace_late"] == (pytest.approx(18 * 0.5), 180)
 
 
 def test_the_other_team_is_asked_as_well() -> None:
-    look = stamina.look(seen_of(tired(), side=-1))
+    look = stamina.look(of_made(tired(), side=-1))
     assert look.numbers["stamina_late"] == (100, 200)
     assert look.numbers["stamina_pace_late"] == (0, 190)
 
@@ -84,7 +70,7 @@ def test_types_by_rank() -> None:
     types["player_speed_max"] = np.full(12, 9.0)
     match = tired()
     match.players["type"][:, :11] = np.arange(1, 12)
-    look = stamina.look(seen_of(match, types))
+    look = stamina.look(of_made(match, types=types))
     ranks = look.arrays["types"]
     names = [key for key, *_ in stamina.TRAITS.values()]
     expected = np.arange(1, 12) / 11
@@ -93,32 +79,32 @@ def test_types_by_rank() -> None:
     np.testing.assert_allclose(ranks[:, names.index("precision")], 1 - expected)
     np.testing.assert_allclose(ranks[:, names.index("reach")], 0.5)
     assert look.numbers["stamina_types_acceleration"] == (pytest.approx(expected[1:].sum()), 10)
-    said = [one.text for one in stamina.tell(subject_of(look, look, look)).claims if "types" in one.text]
+    said = [one.text for one in stamina.tell(of_looks(stamina, [look] * 3)).claims if "types" in one.text]
     assert said == [
         "8, 9, 10 and 11 get the fastest types: 86 % (86 to 86) of the others are worse.",
         "8, 9, 10 and 11 get the quickest off the mark types: 86 % (86 to 86) of the others are worse.",
         "8, 9, 10 and 11 get the least precise types: 86 % (86 to 86) of the others are better.",
     ]
-    assert not stamina.tell(subject_of(look, look, look)).notes
+    assert not stamina.tell(of_looks(stamina, [look] * 3)).notes
     # Two matches may be chance.
-    assert not any("types" in one.text for one in stamina.tell(subject_of(look, look)).claims)
+    assert not any("types" in one.text for one in stamina.tell(of_looks(stamina, [look] * 2)).claims)
 
 
 def test_a_team_that_does_not_choose_types_is_named() -> None:
     """Every number has the same type, and so none a better one than the others."""
-    look = stamina.look(seen_of(tired(), default_player_types(12)))
-    (note,) = stamina.tell(subject_of(look, look, look)).notes
+    look = stamina.look(of_made(tired(), types=default_player_types(12)))
+    (note,) = stamina.tell(of_looks(stamina, [look] * 3)).notes
     assert note.startswith("No number regularly gets better or worse types")
 
 
 def test_a_substitution_is_a_change_of_type_during_the_match() -> None:
     match = tired()
     match.players["type"][5:, 6] = 3
-    look = stamina.look(seen_of(match))
+    look = stamina.look(of_made(match))
     assert look.arrays["substituted"].tolist() == [[7, pytest.approx(2705 / 6000)]]
     assert [(one.text, one.cycle) for one in look.moments["stamina_substitutions"]] == [("7 is substituted", 2705)]
     match.frames["cycle"][:] = 0
-    assert not len(stamina.look(seen_of(match)).arrays["substituted"])
+    assert not len(stamina.look(of_made(match)).arrays["substituted"])
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +143,7 @@ def test_stamina_and_pace_by_a_plain_walk(match: Match) -> None:
     assert look.numbers["stamina_late"] == (pytest.approx(np.sum(stands)), len(stands))
     assert look.numbers["stamina_empty"] == (empty, len(stands))
     assert look.numbers["stamina_pace_late"] == (pytest.approx(np.sum(way), rel=1e-4), len(way))
-    findings = stamina.tell(subject_of(look))
+    findings = stamina.tell(of_looks(stamina, [look]))
     assert findings.claims
     assert not findings.notes
     for picture in findings.pictures:
@@ -167,12 +153,12 @@ def test_stamina_and_pace_by_a_plain_walk(match: Match) -> None:
 def test_what_the_log_lacks_is_said() -> None:
     bare = MadeMatch(20)
     bare.players["stamina"][:] = np.nan
-    found = stamina.tell(subject_of(stamina.look(seen_of(bare))))
+    found = stamina.tell(of_looks(stamina, [stamina.look(of_made(bare))]))
     assert any("stamina" in note for note in found.notes)
     assert not any("empty" in one.text for one in found.claims)
     early = tired()
     early.frames["cycle"] -= 2600
-    notes = stamina.tell(subject_of(stamina.look(seen_of(early)))).notes
+    notes = stamina.tell(of_looks(stamina, [stamina.look(of_made(early))])).notes
     assert any("last quarter" in note for note in notes)
 
 
@@ -185,5 +171,5 @@ def test_nothing_breaks(half_time: float) -> None:
             match.players[name][:] = np.nan
         seen = Seen.of(match.frames, match.players, match.events(), side=1, params=PARAMS | {"half_time": half_time})
         look = stamina.look(seen)
-        for picture in stamina.tell(subject_of(look)).pictures:
+        for picture in stamina.tell(of_looks(stamina, [look])).pictures:
             picture.draw()

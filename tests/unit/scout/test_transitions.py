@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from made_match import LEFT_1, LEFT_2, LEFT_7, LEFT_9, RIGHT_4, RIGHT_9, MadeMatch
-from scouted import of_made, of_match, share, subject_of
+from scouted import both_sides, check_told, of_made, of_match, share, subject_of
 from teamclone.logs import read_match
-from teamclone.plots.page import svg
 from teamclone.rcss import pitch, state_bits
 from teamclone.rcss.playmodes import PlayMode
 from teamclone.scout.places import third
@@ -191,17 +190,8 @@ def rows(seen: Seen, kind: str, outcome: str | None = None) -> list[dict[str, ob
 
 
 def test_what_is_told_of_real_matches(samples_dir: Path) -> None:
-    matches = [read_match(path) for path in sorted(samples_dir.glob("*WEBase*.rcg.xz"))]
-    sides = [1 if match.game.left.name == "HELIOS_base" else -1 for match in matches]
-    pairs = [(of_match(m, side=side), of_match(m, side=-side)) for m, side in zip(matches, sides, strict=True)]
-    found = transitions.tell(subject_of(transitions, pairs))
-    texts = [one.text for one in found.claims]
-    assert len(texts) >= 4
-    assert not any("{" in text or "nan" in text for text in texts)
-    for picture in found.pictures:
-        assert svg(picture.draw(), name=picture.name, alt=picture.alt).startswith("<svg")
-    for table in found.tables:
-        assert {len(row) for row in table.rows} <= {len(table.columns)}
+    found = transitions.tell(subject_of(transitions, both_sides(samples_dir, "WEBase")))
+    check_told(found, least=4)
     for one in found.claims:
         assert all(0 < at.cycle <= 6000 for at in one.moments)
 

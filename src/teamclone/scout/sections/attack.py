@@ -11,13 +11,27 @@ from teamclone.logs.match import Columns
 from teamclone.rcss.players import N_TEAM
 from teamclone.scout.findings import Findings, Picture, Table, claim, claims
 from teamclone.scout.measures import Look, Looks, Measure, Moment
-from teamclone.scout.places import GRID, LANES, THIRDS, Bools, Floats, Ints, counted, in_their_box, lane, third, to_goal
+from teamclone.scout.places import (
+    GRID,
+    LANES,
+    THIRDS,
+    Bools,
+    Floats,
+    Ints,
+    counted,
+    in_their_box,
+    lane,
+    mean_of,
+    third,
+    to_goal,
+)
 from teamclone.scout.sections import attack_figures as figures
 from teamclone.scout.sections.identity import KEY as IDENTITY
 from teamclone.scout.sections.identity import keepers
-from teamclone.scout.seen import Seen, moment
+from teamclone.scout.seen import Seen
 from teamclone.scout.shape import name_of_shape, situations
 from teamclone.scout.subject import Subject
+from teamclone.scout.windows import foremost
 
 KEY = "attack"
 TITLE = "With the ball"
@@ -133,16 +147,13 @@ def look(seen: Seen) -> Look:
                 through["length"][done],
                 "through to",
             ),
-            "shots": [
-                moment(
-                    seen,
-                    int(frame),
-                    unum=int(unum),
-                    text=f"{unum} {'scores' if goal else 'shoots'}",
-                    weight=float(chance),
-                )
-                for frame, unum, chance, goal in zip(shots["frame"], shots["unum"], worth, scored, strict=True)
-            ],
+            "shots": foremost(
+                seen,
+                shots["frame"],
+                shots["unum"],
+                worth,
+                lambda at: f"{shots['unum'][at]} {'scores' if scored[at] else 'shoots'}",
+            ),
         },
     )
 
@@ -235,17 +246,13 @@ def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
 
 
 def _moments(seen: Seen, events: Columns, weight: Floats, words: str) -> list[Moment]:
-    best = np.argsort(-weight, kind="stable")[:5]
-    return [
-        moment(
-            seen,
-            int(events["frame"][at]),
-            unum=int(events["unum"][at]),
-            text=f"{events['unum'][at]} {words} {events['other_unum'][at]}",
-            weight=float(weight[at]),
-        )
-        for at in best
-    ]
+    return foremost(
+        seen,
+        events["frame"],
+        events["unum"],
+        weight,
+        lambda at: f"{events['unum'][at]} {words} {events['other_unum'][at]}",
+    )
 
 
 def tell(subject: Subject) -> Findings:
@@ -293,7 +300,10 @@ def tell(subject: Subject) -> Findings:
             Picture(
                 name="network",
                 draw=lambda: figures.network_and_shots(
-                    _places(subject), looks.total("network"), looks.joined("shots"), matches=len(looks)
+                    mean_of(subject.own[IDENTITY].total("with")),
+                    looks.total("network"),
+                    looks.joined("shots"),
+                    matches=len(looks),
                 ),
                 alt="Pass network and shot map",
                 caption="Left, who passes to whom, players at their mean places with the ball. Right, shots: the "
@@ -318,14 +328,6 @@ def _by(looks: Looks, what: str) -> str:
     if not counts[first]:
         return ""
     return f", most by {first + 1}" + (f" and {second + 1}" if counts[second] else "")
-
-
-def _places(subject: Subject) -> Floats:
-    """Return (11, 2) mean places with the ball."""
-    sums = subject.own[IDENTITY].total("with")
-    with np.errstate(invalid="ignore"):
-        found: Floats = sums[:, :2] / sums[:, 2:]
-    return found
 
 
 def _situations(subject: Subject) -> list[Picture]:

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 
 from teamclone.plots.maps import draw_formation, draw_pass_network, draw_routes, draw_shots, draw_zones
 from teamclone.plots.page import COLOURS, STYLE
-from teamclone.scout.figures import UNUMS, Floats, pitches, routes_taken
+from teamclone.scout.figures import UNUMS, Floats, pitches
 
+CELL_M = 8.0
+"""Ways that begin in one square of this size and end in one are one route."""
+ROUTES = 20
+"""Routes that are drawn, those that are taken most."""
 _WORDS = ("pass", "dribble", "shot", "clear")
 
 
@@ -40,7 +45,7 @@ def network_and_shots(places: Floats, counts: Floats, shots: Floats, *, matches:
 def routes_and_kicks(entries: Floats, kicks: Floats) -> Figure:
     """Draw the ways into the penalty area, (n, 4) from and to, and the kicks (kinds, along, across) by zone."""
     figure, (left, right) = pitches(2)
-    start, end, taken = routes_taken(entries[:, :2], entries[:, 2:])
+    start, end, taken = _routes(entries[:, :2], entries[:, 2:])
     draw_routes(left, start, end, weight=taken, colours=COLOURS)
     left.set_xlim(0, left.get_xlim()[1])
     left.set_title("into the penalty area")
@@ -56,3 +61,14 @@ def routes_and_kicks(entries: Floats, kicks: Floats) -> Figure:
     draw_zones(right, total / max(total.max(), 1), text=text, colours=COLOURS)
     right.set_title("what is done with the ball")
     return figure
+
+
+def _routes(start: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the ways (n, 2) that are taken most, from where to where, and how often: means of ways of equal cells."""
+    ways = np.concatenate([start, end], axis=1).reshape(-1, 4)
+    ways = ways[np.isfinite(ways).all(axis=1)]
+    cells, of = np.unique((ways // CELL_M).astype(np.int64), axis=0, return_inverse=True)
+    taken = np.bincount(of.ravel(), minlength=len(cells)).astype(np.float64)
+    most = np.argsort(-taken, kind="stable")[:ROUTES]
+    means = np.array([ways[of.ravel() == cell].mean(0) for cell in most]).reshape(-1, 4)
+    return means[:, :2], means[:, 2:], taken[most]

@@ -13,7 +13,7 @@ from teamclone.scout.places import GRID, LANES, counted, in_lane, lane, third
 from teamclone.scout.sections import last_line, pressing
 from teamclone.scout.seen import Bools, Floats, Seen
 from teamclone.scout.subject import Subject
-from teamclone.scout.windows import as_one, followed, moment, until, who
+from teamclone.scout.windows import as_one, followed, foremost, until, who
 
 KEY = "defence"
 TITLE = "Without the ball"
@@ -22,11 +22,8 @@ FREE_M = 5.0
 """An opponent without a field player this near is free."""
 LEAST_CYCLES = 50
 """Zones in which fewer were seen stay empty."""
-SHOT_CYCLES = 50
-"""Within how many cycles a shot follows a tackle that fails."""
 MOST_WAYS = 60
 """Through passes that are drawn."""
-MOST_MOMENTS = 4
 TACKLES = (Outcome.WON, Outcome.LOST, Outcome.MISSED)
 
 MEASURES = (
@@ -144,23 +141,21 @@ def _duels(seen: Seen) -> Look:
 def _moments(seen: Seen, failed: Bools) -> list[Moment]:
     """Return tackles that fail and are followed by a shot, those with a goal first."""
     tackles = seen.pick(EventKind.TACKLE)
-    end = until(seen, tackles["frame"], SHOT_CYCLES)
+    end = until(seen, tackles["frame"], last_line.SHOT_CYCLES)
     shot, goal = (
         followed(seen.pick(EventKind.SHOT, *outcome, own=False)["frame"], tackles["frame"], end)
         for outcome in ((), (Outcome.GOAL,))
     )
     rows = np.flatnonzero(failed & shot)
-    rows = rows[np.argsort(-goal[rows].astype(np.int64), kind="stable")[:MOST_MOMENTS]]
-    return [
-        moment(
-            seen,
-            int(tackles["frame"][row]),
-            f"{who(int(tackles['unum'][row]))} tackles in vain, then a {'goal' if goal[row] else 'shot'}",
-            unum=int(tackles["unum"][row]),
-            weight=float(goal[row]),
-        )
-        for row in rows
-    ]
+    return foremost(
+        seen,
+        tackles["frame"][rows],
+        tackles["unum"][rows],
+        goal[rows].astype(np.float64),
+        lambda one: (
+            f"{who(int(tackles['unum'][rows[one]]))} tackles in vain, then a {'goal' if goal[rows[one]] else 'shot'}"
+        ),
+    )
 
 
 def tell(subject: Subject) -> Findings:

@@ -23,7 +23,7 @@ from teamclone.scout.decisions import (
 from teamclone.scout.distribution import LONG_M, RESTART_KINDS, keeper, restarts
 from teamclone.scout.findings import Claim, Findings, Picture, Table, capital, claim, claims
 from teamclone.scout.measures import Look, Looks, Measure, Moment, ratio
-from teamclone.scout.places import LANES, THIRDS
+from teamclone.scout.places import LANES, THIRDS, in_lane
 from teamclone.scout.predictability import (
     LEAST,
     NEARLY_ALWAYS,
@@ -63,7 +63,7 @@ ANSWERS = {
 _SAME = "how often two decisions of a match by one number, in one zone, both pressed or both not, are the same"
 _PARTS = (
     *((f"third_{at}", f"in the {words}") for at, words in enumerate(THIRDS)),
-    *((f"lane_{at}", "in the centre" if words == "centre" else f"on the {words}") for at, words in enumerate(LANES)),
+    *((f"lane_{at}", in_lane(words)) for at, words in enumerate(LANES)),
     ("free", "with no opponent near"),
     ("pressed", "pressed"),
 )
@@ -262,8 +262,7 @@ def _number(one: Habit) -> int:
 
 
 def _where(one: Habit) -> str:
-    across = LANES[one.cell[2] or 0]
-    return f"{'in the centre' if across == 'centre' else f'on the {across}'} of the {THIRDS[one.cell[1] or 0]}"
+    return f"{in_lane(LANES[one.cell[2] or 0])} of the {THIRDS[one.cell[1] or 0]}"
 
 
 def _moments(subject: Subject, one: Habit) -> tuple[Moment, ...]:

@@ -9,7 +9,7 @@ from teamclone.rcss.players import N_TEAM
 from teamclone.scout import figures
 from teamclone.scout.findings import Findings, Picture, Table, claim, claims
 from teamclone.scout.measures import Look, Measure
-from teamclone.scout.places import counted, third
+from teamclone.scout.places import counted, mean_of, summed, third
 from teamclone.scout.seen import Bools, Floats, Seen
 from teamclone.scout.shape import name_of_shape
 from teamclone.scout.subject import Subject
@@ -106,8 +106,8 @@ def look(seen: Seen) -> Look:
             "won": counted(won["end_x"], won["end_y"]),
             "lost": counted(lost["end_x"], lost["end_y"]),
             "goalie": np.any(seen.goalies[:, :N_TEAM], axis=0, keepdims=True)[0],
-            "without": _mean_places(seen, without),
-            "with": _mean_places(seen, with_ball),
+            "without": summed(seen.places[without, :N_TEAM]),
+            "with": summed(seen.places[with_ball, :N_TEAM]),
             "chances": np.concatenate([shots["expected_goals"], against["expected_goals"]]),
             "scored": np.concatenate([shots["outcome"], against["outcome"]]) == Outcome.GOAL,
         },
@@ -130,20 +130,11 @@ def _extent(seen: Seen, these: Bools, axis: int) -> tuple[float, float]:
     return float(extent.sum()), float(len(extent))
 
 
-def _mean_places(seen: Seen, these: Bools) -> Floats:
-    """Return (11, 3) sums of places and the frames that they are of."""
-    place = seen.places[these, :N_TEAM]
-    there: Bools = np.all(np.isfinite(place), axis=-1)
-    sums = np.where(there[..., None], place, 0).sum(0)
-    found: Floats = np.concatenate([sums, there.sum(0)[:, None]], 1)
-    return found
-
-
 def tell(subject: Subject) -> Findings:
     """Return what its matches say of this."""
     looks = subject.own[KEY]
     won, drawn, lost = results(subject)
-    shapes = {when: name_of_shape(_mean(looks.total(when))[:, 0][~keepers(subject)]) for when in ("with", "without")}
+    shapes = {when: name_of_shape(mean_of(looks.total(when))[:, 0][~keepers(subject)]) for when in ("with", "without")}
     stands = " and ".join(
         f"{shapes[when]} {words}, {{length_{when}}} long and {{width_{when}}} wide"
         for when, words in (("without", "without the ball"), ("with", "with it"))
@@ -180,7 +171,7 @@ def tell(subject: Subject) -> Findings:
                 name="shapes",
                 draw=lambda: figures.formations(
                     [
-                        (f"{words}: {shapes[when]}" if shapes[when] else words, _mean(looks.total(when))[:, :2])
+                        (f"{words}: {shapes[when]}" if shapes[when] else words, mean_of(looks.total(when))[:, :2])
                         for when, words in (("without", "without the ball"), ("with", "with the ball"))
                     ]
                 ),
@@ -222,13 +213,6 @@ def results(subject: Subject) -> tuple[int, int, int]:
 def keepers(subject: Subject) -> Bools:
     """Return (11,) which numbers are goalkeepers in most matches."""
     found: Bools = np.asarray(subject.own[KEY].total("goalie") * 2 > len(subject.own[KEY]))
-    return found
-
-
-def _mean(sums: Floats) -> Floats:
-    """Return mean places (11, 2) from sums and frames; NaN of a number that never was on the field."""
-    with np.errstate(invalid="ignore"):
-        found: Floats = sums[:, :2] / sums[:, 2:]
     return found
 
 

@@ -16,7 +16,7 @@ from teamclone.scout.measures import Look, Looks, Measure, Moment
 from teamclone.scout.places import LANES, in_their_box
 from teamclone.scout.sections import set_plays
 from teamclone.scout.seen import Bools, Floats, Seen
-from teamclone.scout.windows import moment, who
+from teamclone.scout.windows import foremost, who
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -31,7 +31,6 @@ LEAST_OUT = 0.005
 """Share of the play outside its penalty area that is worth a word."""
 MOUTH_BINS = 7
 """Across the goal, for the picture."""
-MOST_MOMENTS = 4
 
 MEASURES = (
     Measure(
@@ -182,17 +181,14 @@ def _moments(seen: Seen, shots: Columns, these: Bools, text: str) -> list[Moment
     rows = np.flatnonzero(these)
     expected = np.nan_to_num(shots["expected_goals"][rows])
     weight = expected if text != "scores" else 1.0 - expected
-    return [
-        moment(
-            seen,
-            int(shots["frame"][rows[one]]),
-            f"their {who(int(shots['unum'][rows[one]]))} {text}",
-            unum=int(shots["unum"][rows[one]]),
-            own=False,
-            weight=float(weight[one]),
-        )
-        for one in np.argsort(-weight, kind="stable")[:MOST_MOMENTS]
-    ]
+    return foremost(
+        seen,
+        shots["frame"][rows],
+        shots["unum"][rows],
+        weight,
+        lambda one: f"their {who(int(shots['unum'][rows[one]]))} {text}",
+        own=False,
+    )
 
 
 def tell(looks: Looks, other: Looks) -> Findings:

@@ -13,16 +13,16 @@ from teamclone.scout.findings import Findings, Picture, Table, claim, claims
 from teamclone.scout.measures import Look, Looks, Measure, Moment
 from teamclone.scout.places import LANES, in_lane, lane, third
 from teamclone.scout.seen import Bools, Floats, Seen
-from teamclone.scout.windows import followed, moment, until, who
+from teamclone.scout.windows import followed, foremost, until, who
 
 IN_LINE = 4
 """So many hindmost field players are the last line."""
 BINS = 10
 """Of the ball's place along the pitch."""
 SHOT_CYCLES = 50
+"""Within how many cycles a shot follows a through pass or a tackle that fails."""
 FOLLOW_M = 10.0
 MOST_WAYS = 15
-MOST_MOMENTS = 4
 
 MEASURES = (
     Measure(
@@ -179,18 +179,17 @@ def _moments(seen: Seen, passes: Columns, there: Bools) -> list[Moment]:
         for outcome in ((), (Outcome.GOAL,))
     )
     weight = goal + 0.5 * shot
-    return [
-        moment(
-            seen,
-            int(passes["frame"][rows[one]]),
+    return foremost(
+        seen,
+        passes["frame"][rows],
+        passes["unum"][rows],
+        weight,
+        lambda one: (
             f"their {who(int(passes['unum'][rows[one]]))} plays {who(int(passes['other_unum'][rows[one]]))} through"
-            + (", then a goal" if goal[one] else ", then a shot" if shot[one] else ""),
-            unum=int(passes["unum"][rows[one]]),
-            own=False,
-            weight=float(weight[one]),
-        )
-        for one in np.argsort(-weight, kind="stable")[:MOST_MOMENTS]
-    ]
+            + (", then a goal" if goal[one] else ", then a shot" if shot[one] else "")
+        ),
+        own=False,
+    )
 
 
 def tell(looks: Looks, other: Looks) -> Findings:

@@ -14,7 +14,7 @@ from teamclone.scout.findings import Claim, Findings, Table, claim, claims
 from teamclone.scout.measures import Look, Looks, Measure, Moment, ratio, resampled
 from teamclone.scout.places import LANES, THIRDS, counted, lane, third
 from teamclone.scout.seen import Bools, Floats, Ints, Seen
-from teamclone.scout.windows import followed, moment, who
+from teamclone.scout.windows import followed, foremost, who
 from teamclone.world.channels import CHANNEL
 
 CYCLES = 100
@@ -26,7 +26,6 @@ SIDE_M = 6.0
 """How near to a side line the ball is there."""
 LONG_M = 15.0
 FACING_DEG = 60.0
-MOST_MOMENTS = 4
 
 TRIGGERS = (
     "after a pass backwards",
@@ -170,17 +169,13 @@ def _triggers(seen: Seen, starts: Ints) -> Floats:
 def _moments(seen: Seen, presses: Columns, won: Bools) -> list[Moment]:
     """Return presses that win the ball, nearest to the opponents' goal first."""
     rows = np.flatnonzero(won)
-    rows = rows[np.argsort(-presses["end_x"][rows], kind="stable")[:MOST_MOMENTS]]
-    return [
-        moment(
-            seen,
-            int(presses["frame"][row]),
-            f"{who(int(presses['unum'][row]))} presses and wins it",
-            unum=int(presses["unum"][row]),
-            weight=float(presses["end_x"][row]) + pitch.HALF_LENGTH,
-        )
-        for row in rows
-    ]
+    return foremost(
+        seen,
+        presses["frame"][rows],
+        presses["unum"][rows],
+        presses["end_x"][rows].astype(np.float64) + pitch.HALF_LENGTH,
+        lambda one: f"{who(int(presses['unum'][rows[one]]))} presses and wins it",
+    )
 
 
 def tell(looks: Looks) -> Findings:

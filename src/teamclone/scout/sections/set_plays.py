@@ -13,14 +13,15 @@ from teamclone.rcss.players import N_TEAM
 from teamclone.scout import figures
 from teamclone.scout.findings import Claim, Findings, Picture, Table, claim, claims
 from teamclone.scout.measures import Figure, Look, Looks, Measure, Moment, ratio
+from teamclone.scout.places import mean_of, summed
+from teamclone.scout.sections.turnovers import SHOT_CYCLES
 from teamclone.scout.seen import Bools, Floats, Ints, Seen
-from teamclone.scout.windows import followed, moment, until, who
+from teamclone.scout.windows import followed, foremost, until, who
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 KEPT_CYCLES = 50
-SHOT_CYCLES = 100
 LEAST = 5
 """Rarer set plays are in the table, but in no sentence."""
 RARER = 3
@@ -32,7 +33,6 @@ MOST_BALLS = 20
 """First balls of a place that are kept of a match."""
 SEVERAL_CYCLES = 5
 """For how long after the start of play a player may kick the ball of its set play again."""
-MOST_MOMENTS = 4
 
 KINDS = ("kick off", "kick in", "free kick", "corner kick", "goal kick", "catch")
 """Words of the events, and the free kick that follows a catch of the goalkeeper."""
@@ -205,11 +205,7 @@ def look(seen: Seen) -> Look:
     ways = []
     for place in range(len(PLACES)):
         rows = np.flatnonzero(found.taken & (places == place))
-        standing = seen.places[found.kick[rows], :N_TEAM]
-        there = np.all(np.isfinite(standing), axis=-1)
-        stood[place] = np.concatenate(
-            [np.where(there[..., None], standing, 0).sum(0), there.sum(0)[:, None]], axis=1, dtype=np.float64
-        )
+        stood[place] = summed(seen.places[found.kick[rows], :N_TEAM])
         rows = rows[:MOST_BALLS]
         ways.append(np.concatenate([np.full((len(rows), 1), place), found.ball[rows], found.to[rows]], axis=1))
     return Look(
@@ -247,16 +243,16 @@ def _moments(seen: Seen, found: Taken) -> dict[str, list[Moment]]:
     for index, key in enumerate(KEYS):
         rows = np.flatnonzero((found.kind == index) & found.taken)
         weight = found.goal[rows] + 0.5 * found.shot[rows] + 0.1 * (found.receiver[rows] > 0)
-        moments[key] = [
-            moment(
-                seen,
-                int(found.kick[rows[one]]),
-                f"{found.unum[rows[one]]} to {who(int(found.receiver[rows[one]]))}" + _then(found, int(rows[one])),
-                unum=int(found.unum[rows[one]]),
-                weight=float(weight[one]),
-            )
-            for one in np.argsort(-weight, kind="stable")[:MOST_MOMENTS]
-        ]
+        moments[key] = foremost(
+            seen,
+            found.kick[rows],
+            found.unum[rows],
+            weight,
+            lambda one, rows=rows: (
+                f"{found.unum[rows[one]]} to {who(int(found.receiver[rows[one]]))}"  # type: ignore[misc]
+                + _then(found, int(rows[one]))
+            ),
+        )
     return moments
 
 
@@ -371,15 +367,9 @@ def _draw(looks: Looks, drawn: list[int]) -> Drawing:
     for place in drawn:
         ways = balls[(balls[:, 0] == place) & np.isfinite(balls).all(1)]
         panels.append(
-            (f"{PLACES[place]} ({stood[place, :, 2].max():.0f})", _mean(stood[place]), ways[:, 1:3], ways[:, 3:])
+            (f"{PLACES[place]} ({stood[place, :, 2].max():.0f})", mean_of(stood[place]), ways[:, 1:3], ways[:, 3:])
         )
     return figures.set_plays(panels)
-
-
-def _mean(sums: Floats) -> Floats:
-    with np.errstate(invalid="ignore"):
-        found: Floats = sums[:, :2] / sums[:, 2:]
-    return found
 
 
 def _table(looks: Looks, other: Looks) -> Table:

@@ -15,6 +15,7 @@ from teamclone.scout.measures import Look, Looks, Measure, Moment, ratio
 from teamclone.scout.sections import stamina_figures as drawn
 from teamclone.scout.seen import Bools, Floats, Ints, Seen
 from teamclone.scout.subject import Subject
+from teamclone.scout.windows import moment
 from teamclone.world.traits import ranks
 
 KEY = "stamina"
@@ -292,7 +293,7 @@ def _tired(seen: Seen, bins: Ints, field: Bools) -> list[Moment]:
         for at in np.flatnonzero(many & half)[:1]:
             text = f"{MANY} of its players are empty"
             unum = int(np.flatnonzero(empty[at])[0]) + 1
-            found.append(_moment(seen, int(at), text, unum, weight=float((many & half).sum())))
+            found.append(moment(seen, int(at), text, unum=unum, weight=float((many & half).sum())))
     return found
 
 
@@ -311,7 +312,7 @@ def _changes(seen: Seen) -> list[Moment]:
     changes = seen.pick(EventKind.PLAYER)
     these = np.flatnonzero(_during(changes))
     return [
-        _moment(seen, int(changes["frame"][at]), f"{unum} is substituted", unum)
+        moment(seen, int(changes["frame"][at]), f"{unum} is substituted", unum=unum)
         for at, unum in zip(these.tolist(), changes["unum"][these].tolist(), strict=True)
     ]
 
@@ -320,11 +321,6 @@ def _during(changes: Columns) -> Bools:
     """Return which events of players are changes of a type during the match."""
     found: Bools = np.char.startswith(changes["outcome"], "changes") & (changes["cycle"] > 0)
     return found
-
-
-def _moment(seen: Seen, frame: int, text: str, unum: int, weight: float = 1.0) -> Moment:
-    cycle, stoppage = int(seen.world.cycle[frame]), int(seen.world.stoppage[frame])
-    return Moment(match_id=seen.match_id, cycle=cycle, stoppage=stoppage, unum=unum, text=text, weight=weight)
 
 
 def tell(subject: Subject) -> Findings:

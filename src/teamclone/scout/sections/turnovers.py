@@ -12,14 +12,12 @@ from teamclone.scout.findings import Findings, Table, claim, claims
 from teamclone.scout.measures import Look, Looks, Measure, Moment
 from teamclone.scout.places import THIRDS, third
 from teamclone.scout.seen import Bools, Ints, Seen
-from teamclone.scout.windows import followed, moment, until, who
+from teamclone.scout.windows import followed, foremost, until, who
 
 SHOT_CYCLES = 100
-"""Within how many cycles of play a shot follows a turnover."""
+"""Within how many cycles of play a shot follows a turnover or a set play."""
 SOON_CYCLES = 50
 FORWARD_M = 20.0
-MOST = 4
-"""Moments of a kind that are kept of a match."""
 IN_THIRD = ("own", "middle", "attacking")
 
 MEASURES = (
@@ -131,19 +129,17 @@ def _moments(seen: Seen, turned: Columns, these: Bools, shots: Ints, *, own: boo
     goal = np.isin(first, goals)
     ahead = (1.0 if own else -1.0) * turned["end_x"][rows]
     weight = goal + (0.5 - ahead / pitch.LENGTH)
-    order = np.argsort(-weight, kind="stable")[:MOST]
-    return [
-        moment(
-            seen,
-            int(frame[one]),
+    return foremost(
+        seen,
+        frame,
+        turned["unum"][rows],
+        weight,
+        lambda one: (
             f"{'' if own else 'their '}{who(turned['unum'][rows[one]])} wins it"
-            + f", {'a goal' if goal[one] else 'a shot'} {first[one] - frame[one]} cycles later",
-            unum=turned["unum"][rows[one]],
-            own=own,
-            weight=weight[one],
-        )
-        for one in order
-    ]
+            f", {'a goal' if goal[one] else 'a shot'} {first[one] - frame[one]} cycles later"
+        ),
+        own=own,
+    )
 
 
 def tell(looks: Looks) -> Findings:

@@ -12,12 +12,13 @@ OPTIONS ?=
 MINUTES ?= 30
 DEMO := demo
 
-.PHONY: help install browser demo test docs lint format bench fidelity faults fuzz clean
+.PHONY: help install browser demo test docs notebook lint format bench fidelity faults fuzz clean
 
 help:
 	@echo "make demo     train, replay and report a clone of HELIOS_base on the bundled matches"
 	@echo "make test     run the tests"
 	@echo "make docs     the documentation as one site, site/index.html; its generated pages and figures"
+	@echo "make notebook run docs/notebook.ipynb anew"
 	@echo "make lint     ruff and mypy"
 	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name, COPIES='1 3 39' of each match)"
 	@echo "make fidelity how good clones are, and docs/explanation/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
@@ -63,6 +64,9 @@ docs: install
 	$(BIN)/python docs/figures.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "Wrote site/index.html; a browser searches only what comes from a server: $(BIN)/python -m http.server -d site"
+
+notebook: install
+	$(BIN)/python docs/notebook.py
 
 lint: install
 	$(BIN)/ruff check .

@@ -21,7 +21,12 @@ def test_the_site_builds_and_stands_alone(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     pages = {page.relative_to(tmp_path / "site").with_suffix("") for page in (tmp_path / "site").rglob("*.html")}
-    assert {page.relative_to(ROOT / "docs").with_suffix("") for page in (ROOT / "docs").rglob("*.md")} <= pages
+    sources = (*(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").rglob("*.ipynb"))
+    assert {page.relative_to(ROOT / "docs").with_suffix("") for page in sources} <= pages
+    notebook = (tmp_path / "site" / "notebook.html").read_text()
+    pictures = re.findall(r'src="?(notebook_files/[\w.]+)', notebook)
+    assert len(pictures) > 5
+    assert all((tmp_path / "site" / picture).is_file() for picture in pictures)
     assert (tmp_path / "site" / "search" / "search_index.json").is_file()
     loaded = re.compile(r"<(?:script|img|iframe)[^>]* src=\"?https?:|<link[^>]* rel=\"?(?:stylesheet|icon)[^>]*https?:")
     for page in (tmp_path / "site").rglob("*.html"):

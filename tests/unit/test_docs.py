@@ -55,8 +55,9 @@ def test_every_command_page_is_of_a_command() -> None:
 
 
 def test_the_menu_lists_every_page_once() -> None:
-    listed = re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)
-    assert sorted(listed) == sorted(str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md"))
+    listed = re.findall(r": ([\w/-]+\.(?:md|ipynb))$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)
+    pages = (*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb"))
+    assert sorted(listed) == sorted(str(page.relative_to(DOCS)) for page in pages)
 
 
 def test_every_link_leads_somewhere() -> None:

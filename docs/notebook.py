@@ -30,6 +30,7 @@ def on_files(files: Files, *, config: Any) -> Files:
     if source is None:
         raise FileNotFoundError(NOTEBOOK)
     text, resources = MarkdownExporter().from_filename(str(NOTEBOOK), {"output_files_dir": f"{NOTEBOOK.stem}_files"})
+    text = text.replace('<table border="1" class="dataframe">', "<table>")  # pandas' own look is not the site's
     files.remove(source)
     files.append(_Page.generated(config, NOTEBOOK.name, content=text))
     for name, content in resources["outputs"].items():
@@ -44,8 +45,14 @@ def write(out: Path) -> None:
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     # Its `teamclone` is the command of this interpreter.
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    where = {"metadata": {"path": NOTEBOOK.parent}}
-    NotebookClient(notebook, timeout=600, kernel_name="python3", record_timing=False, resources=where).execute()
+    NotebookClient(
+        notebook,
+        timeout=600,
+        kernel_name="python3",
+        record_timing=False,
+        coalesce_streams=True,
+        resources={"metadata": {"path": NOTEBOOK.parent}},
+    ).execute()
     nbformat.write(notebook, out)
 
 

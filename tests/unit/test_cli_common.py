@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from command import teamclone
-from teamclone.cli.common import fail, print_json, print_table, visible
+from teamclone.cli.common import fail, print_json, print_table, progress, visible
 
 EVIL = "\x1b]0;title\x07\x1b[2JRed\x9b31m\u202eder"
 SHOWN = r"\u001b]0;title\u0007\u001b[2JRed\u009b31m\u202eder"
@@ -45,3 +45,16 @@ def test_a_log_with_an_evil_team(tmp_path: Path, fixtures_dir: Path) -> None:
         done = teamclone(*arguments)
         assert not {*done.stdout, *done.stderr} & {*"\x1b\x07\x9b\u202e"}, arguments
         assert "title" in done.stdout or arguments[0] == "validate"
+
+
+def test_without_a_terminal_there_is_no_bar_and_no_colour(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Notebooks and build servers ask for colour by a variable, and keep what is printed as it is."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    with progress("work") as bar:
+        bar.advance(bar.add_task("", total=2))
+    print_table(["team"], [["Red"]])
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert [line.strip() for line in printed.out.splitlines()] == ["team", "Red"]

@@ -85,20 +85,20 @@ def print_table(
     for row in rows:
         table.add_row(*(visible(str(cell)) for cell in row))
     # Piped output is read by programs and long lines are theirs to break.
-    Console(width=None if sys.stdout.isatty() else 200, highlight=False, markup=False).print(table)
+    terminal = sys.stdout.isatty()
+    Console(force_terminal=terminal, width=None if terminal else 200, highlight=False, markup=False).print(table)
 
 
 def progress(what: str) -> Progress:
     """Return a progress bar on stderr; silent without a terminal."""
-    console = Console(stderr=True)
     return Progress(
         TextColumn(what),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.description}"),
-        console=console,
-        disable=not console.is_terminal,
+        console=Console(stderr=True),
+        disable=not sys.stderr.isatty(),  # a console is also asked by variables, which notebooks set
     )
 
 

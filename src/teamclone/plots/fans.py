@@ -29,7 +29,7 @@ def draw_fans(fans: Sequence[Mapping[str, Any]], *, colours: Colours, width: flo
 
 def draw_fan(axes: Any, fan: Mapping[str, Any], *, colours: Colours) -> None:
     """Draw a fan into axes that have no pitch yet; see `draw_fans`."""
-    draw_pitch(axes, colour=colours.muted, width=0.5)
+    draw_pitch(axes, colour=colours.rule)  # its spots are to be no players
     for place in fan["others"]:
         axes.plot(*place, "o", color=colours.muted, markersize=2.2, zorder=4)
     for body in fan["bodies"]:

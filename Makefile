@@ -86,6 +86,7 @@ bench: install
 	$(BIN)/python benchmarks/training.py .bench/dataset
 	$(BIN)/python benchmarks/stores.py $(MATCHES) --count 2
 	$(BIN)/python benchmarks/replay.py $(MATCHES)
+	$(BIN)/python benchmarks/scout.py $(MATCHES) --team $(TEAM) --counts 3
 
 fidelity: install
 	$(BIN)/python benchmarks/fidelity.py $(MATCHES) --out $(FIDELITY) --page docs/explanation/fidelity.md --team $(TEAM) $(OPTIONS)

@@ -226,7 +226,7 @@ def heat_map(
 def shot_map(
     match: Matches, *, team: str | None = None, side: str | None = None, half: bool = True, axes: Axes | None = None
 ) -> Axes:
-    """Draw from where a team shoots, goals filled.
+    """Draw from where a team shoots, goals filled; the area of a shot is its expected goals.
 
     Args:
         match: a match, its events, the path of its game log, or several of them.
@@ -239,16 +239,19 @@ def shot_map(
         LogError: a log cannot be read.
     """
     played = list(_played(match, team, side))
-    places, goals = [], []
+    places, goals, expected = [], [], []
     for one, sign in played:
         events = _events(one).columns
         these = _of_kinds(events, [EventKind.SHOT]) & (events["side"] == sign)
         places.append(sign * _points(events, these))
         goals.append(events["outcome"][these] == Outcome.GOAL)
+        expected.append(events["expected_goals"][these])
     x, y = np.concatenate(places).T
+    # Where the chance of a shot is not known, it has the least size.
+    size = np.nan_to_num(np.concatenate(expected))
     axes = _axes(axes, _HALF_SIZE if half else _SIZE)
-    maps.draw_shots(axes, x, y, outcome=np.concatenate(goals), colours=LIGHT, half=half)
-    _title(axes, _name(played), f"{len(x)} shots", _number(played))
+    maps.draw_shots(axes, x, y, outcome=np.concatenate(goals), size=size, colours=LIGHT, half=half)
+    _title(axes, _name(played), f"{len(x)} shots, {size.sum():.1f} goals expected", _number(played))
     return axes
 
 

@@ -145,6 +145,10 @@ def test_a_shot_map_has_the_goals_of_the_score_at_the_right(right: tc.Match, tea
     scored, *others = (one.get_offsets() for one in axes.collections if len(one.get_offsets()))
     assert len(scored) == goals
     assert (np.concatenate([scored, *others])[:, 0] > 52.5 - 36).all()
+    expected = getattr(
+        tc.match_events(right).statistics(), "left" if right.left.name == team else "right"
+    ).expected_goals
+    assert f"{expected:.1f} goals expected" in axes.get_title(loc="left")
 
 
 def test_a_moment_is_the_frame_of_the_log(right: tc.Match) -> None:

@@ -82,7 +82,7 @@ def scout(
         )
         failed = [
             *report.failed,
-            *write_scout(report, out, store=opened, run=run, csv_folder=csv, on_progress=telling),
+            *write_scout(report, out, store=opened, csv_folder=csv, on_progress=telling),
         ]
     if as_json:
         print_json(report.document)

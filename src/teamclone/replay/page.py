@@ -11,7 +11,7 @@ import hashlib
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
@@ -41,6 +41,7 @@ from teamclone.replay.predictions import Predictions, predicted
 from teamclone.system.files import write_atomic
 
 if TYPE_CHECKING:
+    from teamclone.evaluation.prediction_table import PredictionTable
     from teamclone.store import Store
 
 SCRIPTS = (
@@ -94,6 +95,7 @@ def make_replay(
     rollouts: Path | str | None = None,
     jasmin: Path | str | None = None,
     home: str | None = None,
+    made: Mapping[int, PredictionTable] | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Replay:
     """Write a match as one HTML file that plays it in a browser.
@@ -113,6 +115,8 @@ def make_replay(
         jasmin: where to write the match for the 3-D player JaSMIn, too.
         home: address of the page that the replay belongs to, as seen from it; None for the report of the run, if it
             lies beside.
+        made: predictions of the run by side, 1 left or -1 right, that are there already; see
+            ``replay.predictions.predicted``.
         on_progress: called with the predictions made and their number.
 
     Returns:
@@ -132,7 +136,9 @@ def make_replay(
     if run is not None:
         from teamclone.training.run import open_run
 
-        expected = predicted(open_run(Path(run)), columns, teams=teams, checkpoint=checkpoint, on_progress=on_progress)
+        expected = predicted(
+            open_run(Path(run)), columns, teams=teams, checkpoint=checkpoint, made=made, on_progress=on_progress
+        )
     fans = [] if rollouts is None else read_fans(Path(rollouts), columns)
     events = listed(find_events(columns.frames, columns.players, columns.params), columns.frames)
     path = Path(out)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from teamclone.replay.payload import Channel, Coding
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from teamclone.evaluation.prediction_table import PredictionTable
     from teamclone.training.run import Run
 
 DRAWS = 15
@@ -89,6 +90,7 @@ def predicted(
     *,
     teams: Sequence[str] = (),
     checkpoint: str = "best-loss",
+    made: Mapping[int, PredictionTable] | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Predictions:
     """Return what the clone of a run predicts for teams of a match.
@@ -99,6 +101,7 @@ def predicted(
         run: the run. match: its columns.
         teams: names of teams, or ``left`` and ``right``; empty for those that the clone learned from.
         checkpoint: which weights.
+        made: tables by side that `predict_match` has made with DRAWS draws; others are made.
         on_progress: called with the rows done and their number, for each team anew.
 
     Raises:
@@ -123,7 +126,9 @@ def predicted(
     for side in dict.fromkeys(sides):
         name = names[side] or ""
         try:
-            table = predict_match(model, match, side=side, draws=DRAWS, on_progress=on_progress)
+            table = (made or {}).get(side)
+            if table is None:
+                table = predict_match(model, match, side=side, draws=DRAWS, on_progress=on_progress)
         except (DatasetError, UsageError) as error:
             notes.append(f"No predictions for {name}: {error}")
             continue

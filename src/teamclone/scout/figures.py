@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from teamclone.plots.maps import draw_formation, draw_zones
 from teamclone.plots.page import ACCENT, COLOURS, MUTED, SECOND, STYLE, WIDTH
 from teamclone.plots.pitch import draw_pitch
+from teamclone.rcss import pitch
 from teamclone.rcss.players import N_TEAM
 from teamclone.scout.measures import ratio, wilson
 
@@ -24,6 +25,8 @@ LEAST_SHOTS = 30
 """With fewer, groups of shots say nothing about expected goals."""
 GROUPS = 5
 UNUMS = range(1, N_TEAM + 1)
+_CAUGHT_TO = -pitch.HALF_LENGTH + pitch.PENALTY_AREA_LENGTH + 2
+"""How much of the pitch is drawn where the goalkeeper catches: it may nowhere else."""
 RATIOS = (0.2, 1.0)
 """Ratios of a zone without any colour and with the strongest one."""
 
@@ -183,15 +186,16 @@ def by_bin(parts: Floats, wholes: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 @mpl.rc_context(STYLE)
-def keeper(x: Floats, lines: Sequence[Curve], goals: Floats, saves: Floats, *, width: float) -> Figure:
-    """Draw how far the goalkeeper is off its line by the distance of the ball, and shots across the goal.
+def keeper(x: Floats, lines: Sequence[Curve], goals: Floats, saves: Floats, *, caught: Floats) -> Figure:
+    """Draw how far the goalkeeper is off its line by the distance of the ball, shots across the goal, and catches.
 
     Args:
-        x: (n,) m. goals, saves: (m,) numbers in equal parts of the goal from its left post. width: of the goal, m.
+        x: (n,) m. goals, saves: (m,) numbers in equal parts of the goal from its left post. caught: (k, 2) m.
     """
     figure = Figure(figsize=(WIDTH, 0.36 * WIDTH), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    left, right, area = figure.subplots(1, 3, width_ratios=(3, 3, 2))
     _curves(left, ("Off its line", "ball from the own goal, m", "m off its line", x, lines))
+    width = pitch.GOAL_WIDTH
     edges = (np.arange(len(goals)) + 0.5) / len(goals) * width - width / 2
     bar = 0.9 * width / len(goals)
     right.bar(edges, goals, bar, color=SECOND, label="goals against")
@@ -200,6 +204,11 @@ def keeper(x: Floats, lines: Sequence[Curve], goals: Floats, saves: Floats, *, w
     right.yaxis.set_major_locator(MaxNLocator(integer=True))
     right.set_ylim(0, 1.3 * max(1.0, float((goals + saves).max())))
     right.legend(ncols=2, loc="upper center")
+    draw_pitch(area, colour=MUTED, width=0.7)
+    area.plot(*caught.T, "o", color=ACCENT, alpha=0.6, markersize=4, markeredgewidth=0)
+    area.set(title=f"Catches ({len(caught)})")
+    area.set_xlim(area.get_xlim()[0], _CAUGHT_TO)
+    area.set_ylim(pitch.PENALTY_AREA_WIDTH / 2 + 2, -pitch.PENALTY_AREA_WIDTH / 2 - 2)
     return figure
 
 

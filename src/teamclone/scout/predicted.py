@@ -13,6 +13,7 @@ from teamclone.errors import DatasetError, TeamcloneError
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.events.definitions import CONTROL_M
 from teamclone.rcss.players import N_TEAM
+from teamclone.replay.predictions import DRAWS
 from teamclone.scout import figures
 from teamclone.scout.findings import Claim, Findings, Picture, Table, claim, claims
 from teamclone.scout.measures import Figure, Look, Looks, Measure, Moment, ratio
@@ -25,6 +26,7 @@ from teamclone.store.store import Store
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from teamclone.evaluation.prediction_table import PredictionTable
     from teamclone.models.clone import Clone
     from teamclone.training.run import Run
 
@@ -67,8 +69,8 @@ MEASURES = (
 )
 
 
-def look_predicted(model: Clone, store: Store, match: TeamMatch) -> Look:
-    """Return what a clone foresees of the commands of the team in a match.
+def look_predicted(model: Clone, store: Store, match: TeamMatch, *, draws: int = 0) -> tuple[Look, PredictionTable]:
+    """Return what a clone foresees of the commands of the team in a match, and its predictions; see `predict_match`.
 
     Raises:
         StoreError: the match cannot be read. DatasetError: its log lacks what the model needs.
@@ -76,7 +78,8 @@ def look_predicted(model: Clone, store: Store, match: TeamMatch) -> Look:
     from teamclone.evaluation.prediction_table import predict_match
 
     columns = MatchColumns.of_store(store, match.match_id)
-    return look(see(store, match)[0], predict_match(model, columns, side=match.side).to_arrow())
+    table = predict_match(model, columns, side=match.side, draws=draws)
+    return look(see(store, match)[0], table.to_arrow()), table
 
 
 class Foresight:
@@ -85,6 +88,9 @@ class Foresight:
     Args:
         run: its run. checkpoint: which of its weights. most: in how many matches it is asked.
 
+    Attributes:
+        tables: its predictions, with the draws of a replay, by the match of which moments are shown.
+
     Raises:
         RunError: there is no such run or checkpoint, or it is of another format.
     """
@@ -92,7 +98,8 @@ class Foresight:
     def __init__(self, run: Path | str, checkpoint: str, *, most: int) -> None:
         from teamclone.training.run import open_run
 
-        self.run, self.most = open_run(run), most
+        self.run, self.checkpoint, self.most = open_run(run), checkpoint, most
+        self.tables: dict[str, PredictionTable] = {}
         self.model = self.run.load_model(checkpoint).eval()
 
     def tell(
@@ -122,9 +129,14 @@ class Foresight:
         notes: list[str] = []
         for done, match in enumerate(chosen, start=1):
             try:
-                looks.append(look_predicted(self.model, store, match))
+                in_replay = match.match_id in shown
+                found, table = look_predicted(self.model, store, match, draws=DRAWS if in_replay else 0)
             except TeamcloneError as error:
                 notes.append(f"Not predicted: {error}")
+            else:
+                looks.append(found)
+                if in_replay:
+                    self.tables[match.match_id] = table
             on_progress(done, len(chosen))
         if subject.team not in self.run.team.split(" + "):
             notes.append(f"The clone learned from {self.run.team}, so what it foresees of {subject.team} is a guess.")

@@ -58,6 +58,7 @@ class Report:
         document: as in ``scout.json``.
         shown: ids of the matches that its moments are of.
         failed: an error for each match that could not be read.
+        foresight: the clone that was held against the matches, and its predictions.
     """
 
     subject: Subject = field(repr=False)
@@ -65,6 +66,7 @@ class Report:
     document: dict[str, Any] = field(repr=False)
     shown: tuple[str, ...]
     failed: tuple[str, ...]
+    foresight: Foresight | None = field(repr=False, default=None)
 
 
 def scout_team(
@@ -127,9 +129,7 @@ def scout_team(
     if against is not None:
         ours = _chosen(store, against, (), failed=failed, left_out=left_out)
         us = watch(store, against, ours, telling=partial(telling, "read your matches"))
-    shown = tuple(one.match_id for one in subject.played[-most_shown:]) if most_shown else ()
-    for looks in (*subject.own.values(), *subject.other.values()):
-        looks.shown = frozenset(shown)
+    shown = _show(subject, most_shown)
     findings: dict[ModuleType, Findings] = {one: one.tell(subject) for one in SECTIONS}
     if foresight is not None:
         foreseen = foresight.tell(store, subject, chosen, shown=shown, on_progress=partial(telling, "predict matches"))
@@ -146,7 +146,16 @@ def scout_team(
         document=_document(store, subject, chapters, left_out, failed),
         shown=shown,
         failed=tuple(failed),
+        foresight=foresight,
     )
+
+
+def _show(subject: Subject, most: int) -> tuple[str, ...]:
+    """Let moments be of the newest matches only, and return the ids of these."""
+    shown = tuple(one.match_id for one in subject.played[-most:]) if most else ()
+    for looks in (*subject.own.values(), *subject.other.values()):
+        looks.shown = frozenset(shown)
+    return shown
 
 
 def _foresight(run: Path | str, checkpoint: str, *, most: int) -> Foresight:

@@ -23,25 +23,26 @@ LEAD = 10
 
 def write_scout(
     report: Report,
-    out: Path,
+    out: Path | str,
     *,
     store: Store,
-    run: Path | None = None,
-    csv_folder: Path | None = None,
+    csv_folder: Path | str | None = None,
     on_progress: Callable[[str, int, int], None] | None = None,
 ) -> list[str]:
     """Write the page, a ``.json`` of the same name, and the replays of the matches whose moments it shows.
 
+    Replays show what the clone of the report expected. The page links to the report of its run, if it lies beside.
+
     Args:
         out: of the page. Replays go into a folder of its name and ``-replays``.
         store: where the matches are.
-        run: a run whose predictions the replays show, and whose report the page links to if it lies beside.
         csv_folder: where each table is written as CSV; None for nowhere.
 
     Returns:
         Why replays could not be made, a line each.
     """
     telling = on_progress or (lambda work, done, total: None)
+    out = Path(out)
     out.parent.mkdir(parents=True, exist_ok=True)
     folder = out.with_name(f"{out.stem}-replays")
     made, failed = {}, []
@@ -50,7 +51,7 @@ def write_scout(
         telling("make replays", done, len(needed))
         path = folder / f"{match_id}.html"
         try:
-            _replay(report, match_id, path, store=store, run=run, home=out)
+            _replay(report, match_id, path, store=store, home=out)
             made[match_id] = f"{folder.name}/{path.name}"
         except (TeamcloneError, OSError) as error:
             failed.append(f"no replay of match {match_id}: {error}")
@@ -64,10 +65,10 @@ def write_scout(
         stoppage = f".{moment.stoppage}" if moment.stoppage else ""
         return f"{quote(made[moment.match_id])}#c={cycle}{stoppage}{player}"
 
-    beside = run is not None and out.parent.resolve() == run.resolve()
+    beside = report.foresight is not None and out.parent.resolve() == report.foresight.run.path.resolve()
     write_document(out.with_suffix(".json"), report.document)
     if csv_folder is not None:
-        _tables(report, csv_folder)
+        _tables(report, Path(csv_folder))
     write_atomic(out, render(report, link=link, report_page="report.html" if beside else None).encode())
     return failed
 
@@ -78,16 +79,33 @@ def _quoted(report: Report) -> set[str]:
 
 
 def _side(report: Report, moment: Moment) -> str:
-    own = next(one.side for one in report.subject.played if one.match_id == moment.match_id)
-    return "l" if (own > 0) == moment.own else "r"
+    return "l" if (_side_of(report, moment.match_id) > 0) == moment.own else "r"
 
 
-def _replay(report: Report, match_id: str, path: Path, *, store: Store, run: Path | None, home: Path) -> None:
+def _side_of(report: Report, match_id: str) -> int:
+    """Return the side of the team in a match, 1 left or -1 right."""
+    return next(one.side for one in report.subject.played if one.match_id == match_id)
+
+
+def _replay(report: Report, match_id: str, path: Path, *, store: Store, home: Path) -> None:
     from teamclone.replay.page import make_replay
 
-    teams = (report.subject.team,) if run is not None else ()
-    back = Path(os.path.relpath(home.resolve(), path.parent.resolve())).as_posix()
-    make_replay(match_id, path, store=store, run=run, teams=teams, home=quote(back))
+    back = quote(Path(os.path.relpath(home.resolve(), path.parent.resolve())).as_posix())
+    clone = report.foresight
+    if clone is None:
+        make_replay(match_id, path, store=store, home=back)
+        return
+    there = clone.tables.get(match_id)
+    make_replay(
+        match_id,
+        path,
+        store=store,
+        run=clone.run.path,
+        checkpoint=clone.checkpoint,
+        teams=(report.subject.team,),
+        made=None if there is None else {_side_of(report, match_id): there},
+        home=back,
+    )
 
 
 def _tables(report: Report, folder: Path) -> None:

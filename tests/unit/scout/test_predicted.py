@@ -16,6 +16,7 @@ from teamclone.scout.predicted import COUNT, LOSS, RIGHT, SURE_RIGHT, look, tell
 from teamclone.scout.seen import Seen
 
 FRAMES = 200
+SHOWN = {"d", "e", "bad"}
 
 
 def seen() -> Seen:
@@ -112,16 +113,17 @@ class _Asked:
 
 
 def foresight(monkeypatch: pytest.MonkeyPatch, trained: set[str] | None, asked: list[str], team: str) -> Any:
-    def foresees(model: object, store: object, match: Any) -> Look:
+    def foresees(model: object, store: object, match: Any, *, draws: int) -> tuple[Look, str]:
+        assert bool(draws) == (match.match_id in SHOWN)
         asked.append(match.match_id)
         if match.match_id == "bad":
             raise DatasetError("match bad: its log has no stamina, which the model needs")
-        return look(seen(), table((0, 7, "dash", 0.96)))
+        return look(seen(), table((0, 7, "dash", 0.96))), f"predictions of {match.match_id}"
 
     monkeypatch.setattr(predicted, "look_predicted", foresees)
     monkeypatch.setattr(predicted, "_trained_on", lambda run: trained)
     made = object.__new__(predicted.Foresight)
-    made.run, made.model, made.most = _Asked(team=team, path=_Asked(name="run")), None, 2
+    made.run, made.model, made.most, made.tables = _Asked(team=team, path=_Asked(name="run")), None, 2, {}
     return made
 
 
@@ -141,8 +143,9 @@ def test_which_matches_it_is_asked_in(
     matches = [_Asked(match_id=name) for name in "abcdef"]
     subject = _Asked(team="Made", played=[_Asked(match_id=name) for name in "abcde"])
     steps: list[tuple[int, int]] = []
-    findings = made.tell(None, subject, matches, shown=(), on_progress=lambda *step: steps.append(step))
+    findings = made.tell(None, subject, matches, shown=SHOWN, on_progress=lambda *step: steps.append(step))
     assert did == asked
+    assert made.tables == {name: f"predictions of {name}" for name in SHOWN.intersection(asked)}
     assert steps == [(1, 2), (2, 2)]
     assert len(findings.notes) == 1
     assert said in findings.notes[0]
@@ -152,7 +155,8 @@ def test_a_clone_of_another_team_and_a_bad_match_are_noted(monkeypatch: pytest.M
     made = foresight(monkeypatch, set(), [], "Another")
     matches = [_Asked(match_id=name) for name in ("good", "bad")]
     subject = _Asked(team="Made", played=matches)
-    findings = made.tell(None, subject, matches, shown=(), on_progress=lambda done, total: None)
+    findings = made.tell(None, subject, matches, shown=SHOWN, on_progress=lambda done, total: None)
     assert findings.claims
+    assert not made.tables
     assert "its log has no stamina" in findings.notes[0]
     assert findings.notes[1] == "The clone learned from Another, so what it foresees of Made is a guess."

@@ -12,6 +12,8 @@ from scouted import both_sides, check_told, of_made, of_match, share, subject_of
 from teamclone.logs import read_match
 from teamclone.rcss import pitch, state_bits
 from teamclone.rcss.playmodes import PlayMode
+from teamclone.scout import figures
+from teamclone.scout.measures import Looks
 from teamclone.scout.places import third
 from teamclone.scout.sections import set_plays, transitions
 from teamclone.scout.seen import Seen
@@ -88,6 +90,32 @@ def test_a_kick_in(lost: bool) -> None:
     np.testing.assert_allclose(look.arrays["set_stood"][0, LEFT_7], [20, -34, 1])
 
 
+def test_where_the_other_team_stands_at_a_kick_in() -> None:
+    made = kick_in(lost=False)
+    made.stand(RIGHT_4, 25.0, -20.0)
+    own, other = of_made(made), of_made(made, side=-1)
+    np.testing.assert_allclose(transitions.look(own).arrays["set_faced"][0, 3], [25, -20, 1])
+    assert not transitions.look(other).arrays["set_faced"].any()
+
+
+def test_a_team_is_drawn_in_its_own_frame_at_its_opponents_set_plays(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = kick_in(lost=False)
+    made.stand(RIGHT_4, 25.0, -20.0)
+    theirs, own = (
+        Looks([transitions.look(of_made(made, side=side))] * set_plays.LEAST_DRAWN, set_plays.MEASURES)
+        for side in (1, -1)
+    )
+    drawn: list[figures.Panel] = []
+    monkeypatch.setattr(figures, "set_plays", drawn.extend)
+    (picture,) = set_plays.tell(own, theirs).pictures
+    picture.draw()
+    ((title, places, start, end),) = drawn
+    assert title == "Kick-ins in its half, from their left (3)"
+    np.testing.assert_allclose(places[3], [-25, 20])
+    np.testing.assert_allclose(start, [[-20, 34]] * set_plays.LEAST_DRAWN)
+    np.testing.assert_allclose(end, [[-30, 20]] * set_plays.LEAST_DRAWN)
+
+
 def test_a_set_play_that_nobody_takes_counts_but_is_not_taken() -> None:
     made = MadeMatch(40)
     made.mode(3, PlayMode.KICK_IN_L, 20)
@@ -107,6 +135,7 @@ def test_the_goalkeeper_kicks_after_a_catch() -> None:
     assert look.numbers["set_catch"][0] == 1
     assert look.numbers["set_free_kick"][0] == 0
     assert look.numbers["keeper_catches"][0] == 1
+    np.testing.assert_allclose(look.arrays["keeper_caught"], [[made.frames["ball_x"][9], made.frames["ball_y"][9]]])
     assert look.arrays["set_receivers"][set_plays.CATCH, 2] == 1
 
 

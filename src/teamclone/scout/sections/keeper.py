@@ -121,6 +121,7 @@ def look(seen: Seen) -> Look:
             "keeper_bare": np.array([_bare(seen)], np.int64),
             "keeper_goals": _across(y[goal & at_goal]),
             "keeper_saves": _across(y[saved & at_goal]),
+            "keeper_caught": np.stack([catches["x"], catches["y"]], 1).astype(np.float32),
         },
         moments={
             "keeper_goals": _moments(seen, shots, goal, "scores"),
@@ -222,9 +223,11 @@ def tell(looks: Looks, other: Looks) -> Findings:
             Picture(
                 name="keeper",
                 draw=lambda: _draw(looks, other, goals, saves),
-                alt="Distance of the goalkeeper from its line by the distance of the ball, and shots across the goal",
+                alt="Distance of the goalkeeper from its line by the distance of the ball, shots across the goal, and "
+                "where it catches",
                 caption="How far the goalkeeper stands off its line, with 95 % intervals over matches; goals against "
-                "it and saves by where the shot crosses the line or would, as the goalkeeper sees it.",
+                "it and saves by where the shot crosses the line or would, as the goalkeeper sees it; the balls that "
+                "it catches.",
             )
         ],
         tables=[_table(looks)],
@@ -269,7 +272,7 @@ def _draw(looks: Looks, other: Looks, goals: Floats, saves: Floats) -> Drawing:
         ],
         goals,
         saves,
-        width=pitch.GOAL_WIDTH,
+        caught=looks.joined("keeper_caught"),
     )
 
 

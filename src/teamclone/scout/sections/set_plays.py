@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,6 +54,15 @@ PLACES = (
     "After a catch",
 )
 """Set plays of which the formation is drawn."""
+FACED = (
+    "Kick-ins in its half, from their left",
+    "Kick-ins in its half, from their right",
+    "Corner kicks from their left",
+    "Corner kicks from their right",
+    "Their goal kicks",
+    "After a catch of their goalkeeper",
+)
+"""The same set plays, as the team sees those of its opponents."""
 
 KEYS = tuple(f"set_{kind.replace(' ', '_')}" for kind in KINDS)
 """Of the measures of each kind."""
@@ -201,11 +212,12 @@ def look(seen: Seen) -> Look:
         numbers[f"{key}_shot"] = (float((found.shot & taken).sum()), float(taken.sum()))
         numbers[f"{key}_wait"] = (float((found.kick - found.start)[taken].sum()), float(taken.sum()))
     places = _places(found)
-    stood = np.zeros((len(PLACES), N_TEAM, 3))
+    stood, faced = np.zeros((2, len(PLACES), N_TEAM, 3))
     ways = []
     for place in range(len(PLACES)):
         rows = np.flatnonzero(found.taken & (places == place))
-        stood[place] = summed(seen.places[found.kick[rows], :N_TEAM])
+        at_kick = seen.places[found.kick[rows]]
+        stood[place], faced[place] = summed(at_kick[:, :N_TEAM]), summed(at_kick[:, N_TEAM:])
         rows = rows[:MOST_BALLS]
         ways.append(np.concatenate([np.full((len(rows), 1), place), found.ball[rows], found.to[rows]], axis=1))
     return Look(
@@ -215,6 +227,7 @@ def look(seen: Seen) -> Look:
             "set_takers": _counted(found.kind[found.taken], found.unum[found.taken], N_TEAM + 1),
             "set_receivers": _counted(found.kind[found.taken], found.receiver[found.taken], N_TEAM + 1),
             "set_stood": stood,
+            "set_faced": faced,
             "set_balls": np.concatenate(ways).astype(np.float32),
         },
         moments=_moments(seen, found),
@@ -262,8 +275,6 @@ def _then(found: Taken, row: int) -> str:
 
 def tell(looks: Looks, other: Looks) -> Findings:
     """Return what its matches say of this; ``other`` is of its opponents."""
-    stood = looks.total("set_stood")
-    drawn = [place for place in range(len(PLACES)) if stood[place, :, 2].max() >= LEAST_DRAWN]
     rare = [words for kind, words in enumerate(PLURAL) if looks.total("set_count")[kind] < LEAST]
     return Findings(
         claims=claims(
@@ -272,17 +283,7 @@ def tell(looks: Looks, other: Looks) -> Findings:
             _of_kind(looks, GOAL_KICK),
             _most_suffered(other),
         ),
-        pictures=[
-            Picture(
-                name="set-plays",
-                draw=lambda: _draw(looks, drawn),
-                alt="Where each number stands as set plays are taken, and where the first ball goes",
-                caption="Where each number stands on average as it takes a set play, and where the first balls go: "
-                "arrows from the ball to the next touch.",
-            )
-        ]
-        if drawn
-        else [],
+        pictures=_pictures(looks, other),
         tables=[_table(looks, other)],
         notes=[f"Too rare in these matches to say anything of: {', '.join(rare)}."] if rare else [],
     )
@@ -361,13 +362,40 @@ def _foremost(looks: Looks, name: str, kind: int, most: int = 2) -> tuple[str, F
     return " and ".join(str(one + 1) for one in chosen), ratio(counts[:, chosen].sum(1), counts.sum(1))
 
 
-def _draw(looks: Looks, drawn: list[int]) -> Drawing:
-    stood, balls = looks.total("set_stood"), looks.joined("set_balls")
+def _pictures(looks: Looks, other: Looks) -> list[Picture]:
+    """Return where the team stands at its own set plays, and at those of its opponents, who see it turned round."""
+    pictures = []
+    for name, whose, these, stood, titles, words in (
+        ("set-plays", "the team's", looks, looks.total("set_stood"), PLACES, "it takes a set play"),
+        ("set-plays-faced", "opponents'", other, other.total("set_faced"), FACED, "an opponent takes a set play"),
+    ):
+        drawn = [place for place in range(len(PLACES)) if stood[place, :, 2].max() >= LEAST_DRAWN]
+        if drawn:
+            pictures.append(
+                Picture(
+                    name=name,
+                    draw=partial(_draw, these, stood, drawn, titles, sign=1 if these is looks else -1),
+                    alt=f"Where each number stands at {whose} set plays, and where the first ball goes",
+                    caption=f"Where each number of the team stands on average as {words}, and where the first balls "
+                    "go: arrows from the ball to the next touch.",
+                )
+            )
+    return pictures
+
+
+def _draw(looks: Looks, stood: Floats, drawn: list[int], titles: Sequence[str], *, sign: int) -> Drawing:
+    """Draw set plays of ``looks`` where the team, -1 if it is the opponent of those who take them, stood."""
+    balls = looks.joined("set_balls")
     panels = []
     for place in drawn:
-        ways = balls[(balls[:, 0] == place) & np.isfinite(balls).all(1)]
+        ways = sign * balls[(balls[:, 0] == place) & np.isfinite(balls).all(1), 1:]
         panels.append(
-            (f"{PLACES[place]} ({stood[place, :, 2].max():.0f})", mean_of(stood[place]), ways[:, 1:3], ways[:, 3:])
+            (
+                f"{titles[place]} ({stood[place, :, 2].max():.0f})",
+                sign * mean_of(stood[place]),
+                ways[:, :2],
+                ways[:, 2:],
+            )
         )
     return figures.set_plays(panels)
 

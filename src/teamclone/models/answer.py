@@ -8,6 +8,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from teamclone.models.distributions import draw_component
 from teamclone.world.state import Target
 
 
@@ -86,4 +87,4 @@ class Answer(ABC):
 
 def draw(logits: Tensor, generator: torch.Generator | None) -> Tensor:
     """Return (batch,) classes drawn with the probabilities of ``logits`` (batch, classes)."""
-    return torch.multinomial(logits.softmax(1), 1, generator=generator).squeeze(1)
+    return draw_component(logits, generator).squeeze(1)

@@ -30,6 +30,10 @@ class Mixture(NamedTuple):
     centre: Tensor
     scale: Tensor
 
+    def select(self, rows: Tensor) -> Mixture:
+        """Return the mixtures of some of the batch: indices or a mask."""
+        return Mixture(*(part[rows] for part in self))
+
 
 def scale_of(raw: Tensor, *, least: float, typical: float) -> Tensor:
     """Return a scale from an unbounded output: about ``typical`` for 0, at most some twenty times as much."""
@@ -181,7 +185,10 @@ def direction_of(logits: Tensor) -> Tensor:
 
 def draw_component(logits: Tensor, generator: torch.Generator | None) -> Tensor:
     """Return (batch, 1) a component of each mixture, drawn with the probabilities of ``logits`` (batch, components)."""
-    return torch.multinomial(logits.softmax(1), 1, generator=generator)
+    # By the distribution function: several times as fast as torch.multinomial.
+    cumulative = logits.softmax(1).cumsum(1)
+    level = _uniform(cumulative[:, -1:], generator) * cumulative[:, -1:]
+    return (cumulative <= level).sum(1, keepdim=True)
 
 
 def draw_value(

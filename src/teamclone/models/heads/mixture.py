@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import torch
@@ -108,6 +109,11 @@ class MixtureAnswer(Answer):
         super().__init__(distribution.logits, temperature)
         self.distribution = distribution
 
+    @cached_property
+    def _kick(self) -> KickAnswer:
+        """The mean of the answers on kicks and tackles."""
+        return _mean_kick(self.distribution.kick)
+
     @property
     def answered_logits(self) -> Tensor:
         """See `Answer.answered_logits`."""
@@ -124,7 +130,7 @@ class MixtureAnswer(Answer):
         """Return the single best answer: of each mixture the weighted medoid of its components."""
         of = self.distribution
         turn = mixture.weighted_medoid(of.turn.logits, of.turn.centre, angle=True) / DEGREE * of.turn_factor
-        kick = _mean_kick(of.kick)
+        kick = self._kick
         on_ball = [
             mixture.weighted_medoid(kick.power.logits, kick.power.centre.clamp(0, 100), angle=False),
             mixture.weighted_medoid(kick.direction.logits, kick.direction.centre, angle=True) / DEGREE,
@@ -150,36 +156,74 @@ class MixtureAnswer(Answer):
 
     def log_likelihood(self, target: Target) -> Tensor:
         """Return (batch,) log-likelihood, in nats, of the parameters of the command given."""
-        return _chosen(self.distribution, target, [_mean_kick(self.distribution.kick)])
+        return _chosen(self.distribution, target, [self._kick])
 
     def draw_parameters(self, kind: Tensor, generator: torch.Generator | None) -> Tensor:
         """Draw (batch, 2) parameters of these commands, see `Answer.draw_parameters`; 0 of kicks left out."""
         of = self.distribution
-        kick, nothing = _mean_kick(of.kick), torch.zeros_like(of.turn_factor)
-        power = mixture.draw_component(of.dash_power.logits, generator)
-        turn, kicked = (mixture.draw_component(one.logits, generator) for one in (of.turn, kick.power))
-        pairs = [
-            (
-                mixture.draw_value(of.dash_power, power, generator, low=0.0, high=100.0),
-                mixture.draw_direction(of.dash_direction, generator),
-            ),
-            (mixture.draw_angle(of.turn, turn, generator, factor=of.turn_factor), nothing),
-            (
-                _spread(mixture.draw_value(kick.power, kicked, generator, low=0.0, high=100.0), of),
-                _spread(mixture.draw_angle(kick.direction, kicked, generator), of),
-            ),
-            (_spread(mixture.draw_direction(kick.tackle, generator), of), nothing),
+        ways: list[Callable[[Tensor, torch.Generator | None], tuple[Tensor, ...]]] = [
+            self._draw_dash,
+            self._draw_turn,
+            self._draw_kick,
+            self._draw_tackle,
         ]
         if of.catch is not None:
-            pairs.append((mixture.draw_direction(of.catch, generator), nothing))
+            ways.append(self._draw_catch)
         if of.move is not None:
-            place = mixture.draw_component(of.move.x.logits, generator)
-            x = mixture.draw_value(of.move.x, place, generator, low=-pitch.MAX_X, high=pitch.MAX_X)
-            y = mixture.draw_value(of.move.y, place, generator, low=-pitch.MAX_Y, high=pitch.MAX_Y)
-            pairs.append((x, y))
-        pairs += [(nothing, nothing)] * (of.logits.shape[1] - len(pairs))  # none has no parameters
-        by_kind = torch.stack([torch.stack(pair, 1) for pair in pairs], 1)
-        return by_kind[torch.arange(len(kind), device=kind.device), kind]
+            ways.append(self._draw_move)
+        drawn = of.turn_factor.new_zeros(len(kind), 2)
+        for index, way in enumerate(ways):
+            rows = torch.nonzero(kind == index).squeeze(1)
+            if of.kick_rows is not None and index in WITH_BALL:
+                rows = rows[torch.isin(rows, of.kick_rows)]
+            for column, values in enumerate(way(rows, generator)):
+                drawn[rows, column] = values
+        return drawn
+
+    def _draw_dash(self, rows: Tensor, generator: torch.Generator | None) -> tuple[Tensor, ...]:
+        power = self.distribution.dash_power.select(rows)
+        component = mixture.draw_component(power.logits, generator)
+        return (
+            mixture.draw_value(power, component, generator, low=0.0, high=100.0),
+            mixture.draw_direction(self.distribution.dash_direction[rows], generator),
+        )
+
+    def _draw_turn(self, rows: Tensor, generator: torch.Generator | None) -> tuple[Tensor, ...]:
+        turn = self.distribution.turn.select(rows)
+        component = mixture.draw_component(turn.logits, generator)
+        return (mixture.draw_angle(turn, component, generator, factor=self.distribution.turn_factor[rows]),)
+
+    def _draw_kick(self, rows: Tensor, generator: torch.Generator | None) -> tuple[Tensor, ...]:
+        power, direction = (part.select(self._asked(rows)) for part in self._kick[:2])
+        component = mixture.draw_component(power.logits, generator)
+        return (
+            mixture.draw_value(power, component, generator, low=0.0, high=100.0),
+            mixture.draw_angle(direction, component, generator),
+        )
+
+    def _draw_tackle(self, rows: Tensor, generator: torch.Generator | None) -> tuple[Tensor, ...]:
+        return (mixture.draw_direction(self._kick.tackle[self._asked(rows)], generator),)
+
+    def _draw_catch(self, rows: Tensor, generator: torch.Generator | None) -> tuple[Tensor, ...]:
+        assert self.distribution.catch is not None
+        return (mixture.draw_direction(self.distribution.catch[rows], generator),)
+
+    def _draw_move(self, rows: Tensor, generator: torch.Generator | None) -> tuple[Tensor, ...]:
+        assert self.distribution.move is not None
+        x, y = (part.select(rows) for part in self.distribution.move)
+        place = mixture.draw_component(x.logits, generator)
+        return (
+            mixture.draw_value(x, place, generator, low=-pitch.MAX_X, high=pitch.MAX_X),
+            mixture.draw_value(y, place, generator, low=-pitch.MAX_Y, high=pitch.MAX_Y),
+        )
+
+    def _asked(self, rows: Tensor) -> Tensor:
+        """Return where situations, (n,) indices into the batch, are among those whose kick was asked for."""
+        kick_rows = self.distribution.kick_rows
+        if kick_rows is None:
+            return rows
+        order = kick_rows.argsort()
+        return order[torch.searchsorted(kick_rows[order], rows)]
 
 
 class MixtureHead(nn.Module):

@@ -40,6 +40,8 @@ def postgres() -> Iterator[Server]:
 def pytest_configure() -> None:
     # What tests write need not outlive the machine, and a busy disk takes tenths of a second to say that it would.
     os.fsync = lambda handle: None
+    # The workers of a run share the processors, and threads of PyTorch that wait for each other keep them busy.
+    os.environ["OMP_NUM_THREADS"] = "1"
     # Of the stand-in for rcssserver, see tests/standin: the interpreter that starts quickest.
     os.environ["STANDIN_PYTHON"] = sys.executable
     # A shell that starts the tests in the background has them ignore Ctrl-C, and so every command that they start.

@@ -65,7 +65,7 @@ def stop_at(epoch: int, batch: int) -> Any:
 
 def test_learns_what_is_there_to_learn(tmp_path: Path) -> None:
     dataset = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=600))
-    config = load_config("small", ["data.batch_size=128", "train.epochs=6", "train.threads=2"])
+    config = load_config("small", ["data.batch_size=128", "train.epochs=6", "train.threads=1"])
     run = train(config, dataset, tmp_path / "run")
     rows = dataset.split(Split.TEST)
     kind = dataset.target(rows).kind

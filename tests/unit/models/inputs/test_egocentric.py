@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import pytest
 import torch
@@ -29,22 +30,27 @@ from teamclone.world.state import State
 SEEN = tuple(block for block in BLOCKS if block != "plan")
 """All but what is planned, which has tests of its own."""
 PARTS = ("core", *SEEN, "geometry")
-FEATURES = EgocentricFeatures(SEEN)
 PLAYER = 11
 """Columns of one player in mates, opponents and rivals."""
+
+
+@cache
+def whole() -> EgocentricFeatures:
+    """The inputs of all these blocks. Made where a test asks: the first ones of a process may have to be compiled."""
+    return EgocentricFeatures(SEEN)
 
 
 def part(projected: Tensor, name: str) -> Tensor:
     """(batch, columns) of one block."""
     if name == "geometry":
-        return projected[:, FEATURES.n_inputs :]
-    inputs = FEATURES.names[: FEATURES.n_inputs]
+        return projected[:, whole().n_inputs :]
+    inputs = whole().names[: whole().n_inputs]
     return projected[:, [i for i, column in enumerate(inputs) if column.rpartition("_")[0] == name]]
 
 
 def seen(state: State, name: str) -> list[float]:
     """A block of the only situation."""
-    return part(FEATURES.project(state), name)[0].tolist()
+    return part(whole().project(state), name)[0].tolist()
 
 
 def geometry(state: State) -> dict[str, float]:
@@ -72,20 +78,20 @@ def test_names_are_the_columns_and_unique() -> None:
 
 def test_blocks_keep_their_columns_whatever_else_there_is() -> None:
     """In the order of BLOCKS, however they are asked for."""
-    whole = FEATURES.project(situations(5, history=PAST_FRAMES))
+    everything = whole().project(situations(5, history=PAST_FRAMES))
     some = EgocentricFeatures(("opponents", "self", "past"))
     assert some.blocks == ("self", "opponents", "past")
     projected = some.project(situations(5, history=PAST_FRAMES))
-    assert torch.equal(projected, torch.cat([part(whole, name) for name in ("core", *some.blocks, "geometry")], 1))
+    assert torch.equal(projected, torch.cat([part(everything, name) for name in ("core", *some.blocks, "geometry")], 1))
 
 
 def test_columns_finds_blocks() -> None:
     state = situations(2, history=PAST_FRAMES)
-    projected = FEATURES.project(state)
-    places = FEATURES.columns(("reach", "self"))
+    projected = whole().project(state)
+    places = whole().columns(("reach", "self"))
     expected = torch.cat([part(projected, name) for name in ("core", "self", "reach")], 1)
     assert torch.equal(projected[:, places], expected)
-    assert FEATURES.columns(()) == list(range(part(projected, "core").shape[1]))
+    assert whole().columns(()) == list(range(part(projected, "core").shape[1]))
 
 
 def test_inputs_are_normalised_and_limited_and_geometry_stays() -> None:
@@ -344,9 +350,9 @@ def test_past() -> None:
 
 def test_a_past_that_is_not_there_is_told() -> None:
     with pytest.raises(ValueError, match=r"expected a state with 3 frames before it, got 1; ask for them: .*history="):
-        FEATURES.project(situations(2, history=1))
-    more = FEATURES.project(situations(2, history=PAST_FRAMES + 2))
-    assert torch.equal(more, FEATURES.project(situations(2, history=PAST_FRAMES)))
+        whole().project(situations(2, history=1))
+    more = whole().project(situations(2, history=PAST_FRAMES + 2))
+    assert torch.equal(more, whole().project(situations(2, history=PAST_FRAMES)))
 
 
 # What the inputs do not hang on.
@@ -366,11 +372,11 @@ def reordered(state: State, order: Tensor) -> State:
 def test_players_are_known_by_no_number_but_by_role() -> None:
     """However each team is numbered, all but ``role`` is the same bit for bit."""
     state = situations(300, history=PAST_FRAMES)
-    before = FEATURES.project(state)
+    before = whole().project(state)
     generator = torch.Generator().manual_seed(0)
     for _ in range(3):
         order = torch.cat([torch.randperm(11, generator=generator), 11 + torch.randperm(11, generator=generator)])
-        after = FEATURES.project(reordered(state, order))
+        after = whole().project(reordered(state, order))
         for name in PARTS:
             assert torch.equal(part(before, name), part(after, name)) == (name != "role"), name
 
@@ -395,14 +401,14 @@ def moved(state: State, *, degrees: float, by: tuple[float, float]) -> State:
 @pytest.mark.parametrize(("degrees", "by"), [(0, (3.0, -7.0)), (90, (0.0, 0.0)), (-137, (5.5, 2.25))])
 def test_what_is_relative_does_not_see_where_on_the_pitch(degrees: float, by: tuple[float, float]) -> None:
     state = situations(200, history=PAST_FRAMES, dtype=torch.float64)
-    before, after = (FEATURES.project(each) for each in (state, moved(state, degrees=degrees, by=by)))
+    before, after = (whole().project(each) for each in (state, moved(state, degrees=degrees, by=by)))
     for name in ("role", "type", "last", "view", "ball", "reach", "mates", "opponents", "rivals", "past"):
         # A place on the pitch has single precision, some micrometres; a direction to the ball makes degrees of them.
         assert torch.allclose(part(before, name), part(after, name), atol=1e-4), name
     # Of himself all but the two of the body direction.
     assert torch.allclose(part(before, "self")[:, 2:], part(after, "self")[:, 2:], atol=1e-6)
     for name in ("turn_factor", "decay", "dash_gain", "income", "near_m", "kick_gain", "forward", "aside"):
-        place = len(FEATURES.names) - len(GEOMETRY) + GEOMETRY.index(name)
+        place = len(whole().names) - len(GEOMETRY) + GEOMETRY.index(name)
         assert torch.allclose(before[:, place], after[:, place], atol=1e-5), name
     for name in ("core", "lines"):
         assert not torch.allclose(part(before, name), part(after, name), atol=1e-3)
@@ -416,20 +422,20 @@ def test_left_and_right_are_alike() -> None:
         balls[..., [1, 3]] *= -1
     for players in (mirrored.players, mirrored.past_players):
         players[..., [CHANNEL[name] for name in ("y", "vy", "body", "neck")]] *= -1
-    before, after = FEATURES.project(state), FEATURES.project(mirrored)
+    before, after = whole().project(state), whole().project(mirrored)
     same = torch.isclose(before, after, atol=1e-9).all(0)
     flipped = torch.isclose(before, -after, atol=1e-9).all(0)
-    assert [name for name, good in zip(FEATURES.names, same | flipped, strict=True) if not good] == []
-    sides = {name for name, is_flipped in zip(FEATURES.names, flipped & ~same, strict=True) if is_flipped}
+    assert [name for name, good in zip(whole().names, same | flipped, strict=True) if not good] == []
+    sides = {name for name, is_flipped in zip(whole().names, flipped & ~same, strict=True) if is_flipped}
     assert {"y", "sin", "aside", "turn_to_ball", "turn_to_meet", "mate_3_y", "self_1", "self_4", "ball_1"} <= sides
     assert not {"x", "cos", "forward", "line_x", "power", "mate_3_x", "self_0", "self_3", "ball_0"} & sides
     # Of columns that are zero, such as those of turns in a past without any, both hold.
-    assert torch.where(FEATURES.signs < 0, flipped, same).all()
+    assert torch.where(whole().signs < 0, flipped, same).all()
 
 
 def test_signs_of_blocks_hang_on_nothing_else() -> None:
     """Neither on what other blocks there are nor on what was drawn before."""
-    signs = dict(zip(FEATURES.names, FEATURES.signs.tolist(), strict=True))
+    signs = dict(zip(whole().names, whole().signs.tolist(), strict=True))
     for seed, blocks in enumerate((("self",), ("view", "past"), ("opponents", "rivals", "mates"))):
         torch.manual_seed(seed)
         some = EgocentricFeatures(blocks)
@@ -529,7 +535,7 @@ def test_each_value_moves_its_own_blocks_only(
     state.players[:, [2, 5], CHANNEL["last_command"]] = int(CommandKind.DASH)
     changed = copied(state)
     change(changed)
-    before, after = FEATURES.project(state), FEATURES.project(changed)
+    before, after = whole().project(state), whole().project(changed)
     different = {name for name in PARTS if not torch.equal(part(before, name), part(after, name))}
     assert different >= must, what
     assert different <= must | may, what
@@ -587,7 +593,7 @@ def alone(state: State) -> None:
 def test_inputs_are_numbers_in_strange_situations(strange: Callable[[State], None]) -> None:
     state = situations(30, history=PAST_FRAMES)
     strange(state)
-    assert FEATURES.project(state).isfinite().all()
+    assert whole().project(state).isfinite().all()
 
 
 def test_those_off_the_field_are_seen_nowhere() -> None:
@@ -599,4 +605,4 @@ def test_those_off_the_field_are_seen_nowhere() -> None:
     state.players[:, gone, CHANNEL["last_command"]] = 0
     other = copied(state)
     other.players[:, gone, : CHANNEL["flags"]] = 3.0
-    assert torch.equal(FEATURES.project(state), FEATURES.project(other))
+    assert torch.equal(whole().project(state), whole().project(other))

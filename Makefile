@@ -56,6 +56,7 @@ demo: install
 	$(BIN)/teamclone export --check $(DEMO)/export
 
 test: install browser
+	$(BIN)/python tests/kernels.py
 	$(BIN)/python -m pytest -n 2 --dist loadscope
 
 # Broken links and pages that no menu lists are errors.

@@ -16,11 +16,10 @@ from teamclone.models.layers.players import PlayerEncoder
 from teamclone.world.channels import CHANNEL, FLAG_ON_FIELD
 from teamclone.world.state import State
 
-FEATURES = EgocentricFeatures(("ball",), others=True)
-
 
 def inputs_of(state: State) -> Inputs:
-    return FEATURES.layout.unpack(FEATURES.project(state))
+    features = EgocentricFeatures(("ball",), others=True)
+    return features.layout.unpack(features.project(state))
 
 
 def placed(ball: tuple[float, float], mates: list[tuple[float, float]], opponents: list[tuple[float, float]]) -> Inputs:

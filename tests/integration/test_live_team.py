@@ -223,6 +223,8 @@ def test_ctrl_c_says_bye(standin: Standin, tmp_path: Path, run: Path) -> None:
         _, err = team.communicate(timeout=60)
     assert team.returncode == 130
     assert "Traceback" not in err
+    for unum in range(1, N_TEAM + 1):
+        standin.wait_for_words(f"A player disconnected : (HELIOS_base {unum})")
     standin.end()
     (log,) = tmp_path.glob("*.rcl")
     left = re.findall(r"Recv HELIOS_base_(\d+): \(bye\)", log.read_text())

@@ -154,18 +154,23 @@ class Server:
     def send(self, client: Client, text: str) -> None:
         try:
             client.socket.send(f"{text}\0".encode())
-        except OSError:  # nobody is there any more, or he does not read
+        except BlockingIOError:  # nobody reads it
             self.drop(client)
+        except OSError:  # nobody is there any more
+            self.receive(client, gone=True)
 
-    def receive(self, client: Client) -> None:
+    def receive(self, client: Client, *, gone: bool = False) -> None:
+        """Takes all that a client has sent; one that has gone may have said goodbye before."""
         while client.socket.fileno() in self.clients:
             try:
                 data = client.socket.recv(8192)
             except BlockingIOError:
+                if gone:
+                    self.drop(client)
                 return
             except OSError:
-                self.drop(client)
-                return
+                gone = True
+                continue
             text, nul, _ = data.partition(b"\0")
             if not nul:
                 self.send(client, "(warning message_not_null_terminated)")

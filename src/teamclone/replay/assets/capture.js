@@ -4,12 +4,17 @@ import { colours, FONT } from "./theme.js";
 
 const LONGEST_S = 30;
 const CLIP_RATE = 30;
+// How long a slow encoder may take to give its first picture, and how often it is asked.
+const PATIENCE_MS = 20_000;
+const ASK_MS = 100;
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
 
 export class Capture {
   constructor(pitch, match, clock, onChange) {
     Object.assign(this, { pitch, match, clock, onChange });
     this.recorder = null;
+    // Set when the clip shall end: the moment after which nothing more is waited for.
+    this.endBefore = null;
   }
 
   get recording() {
@@ -55,7 +60,7 @@ export class Capture {
   /** Begin a clip, or end it. */
   clip() {
     if (this.recorder) {
-      this.recorder.stop();
+      this.finish();
       return;
     }
     const type = TYPES.find((one) => globalThis.MediaRecorder?.isTypeSupported(one));
@@ -67,19 +72,42 @@ export class Capture {
     const recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: 6_000_000 });
     const parts = [];
     const name = this.name(type.startsWith("video/mp4") ? "mp4" : "webm");
-    recorder.addEventListener("dataavailable", (event) => parts.push(event.data));
+    recorder.addEventListener("dataavailable", (event) => {
+      if (event.data.size) parts.push(event.data);
+      if (this.endBefore === null || recorder.state === "inactive") return;
+      if (parts.length || performance.now() > this.endBefore) {
+        recorder.stop();
+        return;
+      }
+      setTimeout(() => {
+        this.compose();
+        recorder.requestData();
+      }, ASK_MS);
+    });
     recorder.addEventListener("stop", () => {
       clearTimeout(this.limit);
       for (const track of stream.getTracks()) track.stop();
       this.recorder = null;
+      if (!parts.length) {
+        this.onChange("The browser recorded no picture: nothing is saved.");
+        return;
+      }
       this.lastClip = new Blob(parts, { type: type.split(";")[0] });
       save(this.lastClip, name);
       this.onChange("The clip is saved.");
     });
     recorder.start(1000);
     this.recorder = recorder;
-    this.limit = setTimeout(() => recorder.stop(), LONGEST_S * 1000);
+    this.endBefore = null;
+    this.limit = setTimeout(() => this.finish(), LONGEST_S * 1000);
     this.onChange("Recording.");
+  }
+
+  /** End the clip as soon as it has a picture: what is stopped before the encoder gave its first is an empty file. */
+  finish() {
+    if (this.endBefore !== null) return;
+    this.endBefore = performance.now() + PATIENCE_MS;
+    this.recorder.requestData();
   }
 
   /** After each picture of the pitch. */

@@ -50,7 +50,7 @@ def pytest_configure() -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--kills", type=int, default=3, help="how often each test of tests/faults kills its command")
+    parser.addoption("--kills", type=int, default=2, help="how often tests kill a command at random moments")
 
 
 @pytest.fixture(scope="session")

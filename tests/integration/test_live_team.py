@@ -15,11 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.integration.test_play import both_servers
 
 import teamclone as tc
 from command import TEAMCLONE, teamclone
-from playing import STANDIN, strays, write_schedule
+from playing import STANDIN, both_servers, strays, write_schedule
 from teamclone.dataset.build import DatasetConfig
 from teamclone.logs import read_match
 from teamclone.logs.match import Match

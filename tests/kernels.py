@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from planned import plans_of
 from situations import situations
 
 FIXTURES = Path(__file__).resolve().parent / "data" / "fixtures"
@@ -19,9 +20,11 @@ FIXTURES = Path(__file__).resolve().parent / "data" / "fixtures"
 def compile_inputs() -> None:
     from teamclone.models.clone import Clone
     from teamclone.models.config import EgocentricConfig
+    from teamclone.planner.scene import COLUMNS, ROWS
 
-    inputs = Clone(EgocentricConfig()).inputs
+    inputs, state = Clone(EgocentricConfig()).inputs, situations(3)
     inputs.project(situations(3, history=inputs.history))
+    plans_of(np.zeros((3, ROWS, COLUMNS)), state.actor.numpy(), state.each().server.numpy())
 
 
 def compile_network_and_readers() -> None:

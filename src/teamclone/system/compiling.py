@@ -14,9 +14,10 @@ from typing import Any
 from numba import njit
 from numba.core import event
 
-kernel: Any = njit(nogil=True, error_model="numpy")
+kernel: Any = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 """Compiles a function that other kernels call. It is not cached, since the cache does not see which calls which: the
-kernel that Python calls is cached with all of them. What such functions may use: `teamclone.export.rules`."""
+kernel that Python calls is cached with all of them. What such functions may use: `teamclone.export.rules`. Wrappers for
+callers in C, of which there are none, would be compiled with all that they call, too."""
 
 
 def version_of(*modules: ModuleType) -> int:

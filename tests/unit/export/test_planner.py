@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cpp import CHECKED, QUICK, compiled, run
+from tests.planned import plans_of
 from tests.situations import situations
 
 from teamclone.dataset.build import DatasetConfig, build_dataset
@@ -17,7 +18,6 @@ from teamclone.export.entries import ENTRIES, MEMORY_BYTES
 from teamclone.export.translate import translate
 from teamclone.planner.columns import PLAN
 from teamclone.planner.kick_sequences import DIRECTIONS, ORDER_FIELDS, PAIRS, kick_order
-from teamclone.planner.plan import orders_of, plan_scene
 from teamclone.planner.scene import COLUMNS, ROWS, fill_scene
 from teamclone.rcss.commands import CLONED_KINDS, CommandKind
 from teamclone.store import create_store
@@ -45,12 +45,7 @@ def scenes(ball: np.ndarray, players: np.ndarray, types: np.ndarray, server: np.
 def plans(*parts: np.ndarray) -> np.ndarray:
     """Return the plans by Numba."""
     *_, server, actor = parts
-    orders, which = orders_of(server)
-    orders.flags.writeable = False  # as the translation has it
-    made = np.zeros((len(actor), len(PLAN)))
-    for index, scene in enumerate(scenes(*parts[:4])):
-        plan_scene(scene, actor[index], orders[which[index]], made[index])
-    return made
+    return plans_of(scenes(*parts[:4]), actor, server)
 
 
 @pytest.fixture(scope="module")

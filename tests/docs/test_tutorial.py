@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from command import teamclone
+from command import called
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
@@ -59,7 +59,7 @@ def test_every_command_prints_what_the_page_shows(tmp_path: Path) -> None:
         "info", "ingest", "matches", "sql", "dataset", "train", "evaluate", "report",
     ]  # fmt: skip
     for command, shown in STEPS:
-        printed = teamclone(*shlex.split(command), cwd=tmp_path).stdout
+        printed = called(*shlex.split(command), cwd=tmp_path).stdout
         assert fits(shown, printed), f"teamclone {command}\n--- the page shows\n{shown}\n--- printed\n{printed}"
     assert (tmp_path / "run" / "report.html").is_file()
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from command import teamclone
+from command import called, teamclone
 
 SHORT = ("--set", "train.epochs=3", "--set", "data.batches_per_epoch=30")
 
@@ -34,13 +34,13 @@ def read(path: Path) -> Any:
 
 
 def test_the_store_holds_the_six_matches(work: Path) -> None:
-    rows = teamclone("sql", "select count(*) n, sum(n_frames) f from matches", "--store", work / "store", "--json")
+    rows = called("sql", "select count(*) n, sum(n_frames) f from matches", "--store", work / "store", "--json")
     assert json.loads(rows.stdout) == [{"n": 6, "f": 14275}]
 
 
 def test_a_second_ingest_does_nothing(work: Path, samples_dir: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in (work / "store" / "matches").rglob("*")}
-    again = json.loads(teamclone("ingest", samples_dir, "--store", work / "store", "--json").stdout)
+    again = json.loads(called("ingest", samples_dir, "--store", work / "store", "--json").stdout)
     assert again["matches"] == {"added": 0, "replaced": 0, "unchanged": 6}
     assert {path: path.stat().st_mtime_ns for path in (work / "store" / "matches").rglob("*")} == before
 
@@ -72,7 +72,7 @@ def test_executed_is_what_sql_over_the_counters_says(work: Path) -> None:
         )
         select count(*) as n from pairs where playmode = 3 and (state & 8) = 0 and next_dash > count_dash
     """
-    rows = teamclone("sql", query, "--store", work / "store", "--json").stdout
+    rows = called("sql", query, "--store", work / "store", "--json").stdout
     counted = json.loads(rows)[0]["n"]
     dashes = sum(rows["dash"] for rows in read(work / "cleaning.json")["rows"].values())
     assert abs(counted - dashes) <= 0.001 * counted
@@ -105,7 +105,7 @@ def test_the_report_shows_the_evaluation(work: Path) -> None:
 def test_the_paper_row_split_is_there_for_comparison(work: Path) -> None:
     out = work / "rows"
     options = ("--team", "HELIOS_base", "--unseen", "YuShan2024", "--split", "rows", "--json")
-    report = json.loads(teamclone("dataset", "--store", work / "store", "--out", out, *options).stdout)
+    report = json.loads(called("dataset", "--store", work / "store", "--out", out, *options).stdout)
     rows = {split: sum(kinds.values()) for split, kinds in report["rows"].items()}
     seen = rows["train"] + rows["validation"] + rows["test"]
     # Rounded within each of the six matches.
@@ -115,7 +115,5 @@ def test_the_paper_row_split_is_there_for_comparison(work: Path) -> None:
 
 def test_training_goes_on_where_it_stopped(work: Path) -> None:
     assert len((work / "run" / "metrics.jsonl").read_text().splitlines()) == 3
-    resumed = teamclone(
-        "train", work / "dataset", "--out", work / "run", "--resume", "--set", "train.epochs=4", "--json"
-    )
+    resumed = called("train", work / "dataset", "--out", work / "run", "--resume", "--set", "train.epochs=4", "--json")
     assert json.loads(resumed.stdout)["epochs"] == 4

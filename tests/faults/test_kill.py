@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from command import TEAMCLONE, teamclone
+from command import TEAMCLONE, called, teamclone
 
 FIXTURES = ("v6", "json", "native-v4", "native-v5", "oddname", "realtime")
 MATCH = ("--team", "HELIOS_base", "--split", "rows")
@@ -75,14 +75,14 @@ def logs(tmp_path_factory: pytest.TempPathFactory, fixtures_dir: Path) -> Path:
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory, logs: Path) -> Path:
     folder = tmp_path_factory.mktemp("store") / "store"
-    teamclone("ingest", logs, "--store", folder)
+    called("ingest", logs, "--store", folder, "--jobs", 1)
     return folder
 
 
 @pytest.fixture(scope="module")
 def dataset(store: Path) -> Path:
     folder = store.with_name("dataset")
-    teamclone("dataset", "--store", store, *MATCH, "--out", folder)
+    called("dataset", "--store", store, *MATCH, "--out", folder, "--jobs", 1)
     return folder
 
 
@@ -99,17 +99,17 @@ def test_ingest(store: Path, logs: Path, tmp_path: Path, kills: int) -> None:
         folder = tmp_path / str(attempt)
         command = ("ingest", logs, "--store", folder)
         hits += killed_once(command, within=usual, chance=chance)
-        teamclone(*command)
+        called(*command, "--jobs", 1)
         assert digest(folder / "matches", "*.parquet") == digest(store / "matches", "*.parquet")
         assert status_rows(folder) == status_rows(store)
-        counted = teamclone("sql", "select count(*) n from matches", "--store", folder, "--json").stdout
+        counted = called("sql", "select count(*) n from matches", "--store", folder, "--json").stdout
         assert json.loads(counted) == [{"n": len(FIXTURES)}]
         shutil.rmtree(folder)
-    assert hits >= kills // 3, "the kills came too late to say anything"
+    assert hits >= max(1, kills // 3), "the kills came too late to say anything"
 
 
 def test_dataset(store: Path, dataset: Path, tmp_path: Path, kills: int) -> None:
-    chance = random.Random(2)
+    chance = random.Random(5)
     usual = timed(lambda: teamclone("dataset", "--store", store, *MATCH, "--out", tmp_path / "usual"))
     hits = 0
     for attempt in range(kills):
@@ -118,14 +118,14 @@ def test_dataset(store: Path, dataset: Path, tmp_path: Path, kills: int) -> None
         hits += killed_once(command, within=usual, chance=chance)
         if folder.exists():
             assert digest(folder, "*.npy") == digest(dataset, "*.npy"), "a dataset is whole or it is not there"
-        teamclone(*command, "--replace")
+        called(*command, "--replace", "--jobs", 1)
         assert digest(folder, "*.npy") == digest(dataset, "*.npy")
         assert (
             json.loads((folder / "dataset.json").read_text())["id"]
             == (json.loads((dataset / "dataset.json").read_text())["id"])
         )
         shutil.rmtree(folder)
-    assert hits >= kills // 3
+    assert hits >= max(1, kills // 3)
 
 
 def figures(run: Path) -> list[dict[str, Any]]:
@@ -144,9 +144,9 @@ def test_train(dataset: Path, tmp_path: Path, kills: int) -> None:
         hits += killed_once(("train", dataset, "--out", run, *SHORT), within=usual, chance=chance)
         before = len(figures(run)) if (run / "metrics.jsonl").exists() else 0
         begun = (run / "config.toml").exists()
-        teamclone("train", dataset, "--out", run, *(("--resume",) if begun else SHORT))
+        called("train", dataset, "--out", run, *(("--resume",) if begun else SHORT))
         assert figures(run) == figures(whole)
         assert before <= len(figures(whole))
         assert digest(run / "checkpoints", "*") == digest(whole / "checkpoints", "*")
         shutil.rmtree(run)
-    assert hits >= kills // 3
+    assert hits >= max(1, kills // 3)

@@ -116,11 +116,17 @@ def test_a_dataset_of_play_on_has_nothing_of_it(tmp_path: Path) -> None:
     assert "var(--none)" not in text
 
 
-@pytest.mark.parametrize("preset", ["small", "best"])
-def test_further_commands_are_learned_from_made_matches(tmp_path: Path, preset: str) -> None:
+@pytest.mark.parametrize(
+    ("preset", "learning"),
+    [
+        ("small", ("data.batch_size=64", "train.epochs=10", "train.learning_rate=0.005")),
+        ("best", ("data.batch_size=128", "train.epochs=3", "train.learning_rate=0.01")),
+    ],
+    ids=["small", "best"],
+)
+def test_further_commands_are_learned_from_made_matches(tmp_path: Path, preset: str, learning: tuple[str, ...]) -> None:
     made = open_dataset(make_dataset(tmp_path / "ds", frames_per_match=200, commands=REPERTOIRE))
-    more = ("data.batch_size=64", "data.batches_per_epoch=99", "data.validation_batches=0", "train.epochs=10")
-    more = (*more, "train.learning_rate=0.005", "train.schedule=constant")
+    more = (*learning, "data.batches_per_epoch=99", "data.validation_batches=0", "train.schedule=constant")
     config = load_config(
         preset, [*SMALL, *(MIXTURE[:-2] if preset == "best" else ()), *more, ALL, "model.hidden=[64, 32]"]
     )

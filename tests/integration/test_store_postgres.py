@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from command import TEAMCLONE, teamclone
+from command import TEAMCLONE, called, teamclone
 from postgres import DATABASE, ENCODED, PASSWORD, Server, start_server
 from teamclone.dataset.build import DatasetConfig, build_dataset
 from teamclone.logs import read_match
@@ -81,7 +81,7 @@ def test_every_command_takes_the_url(url: str, fixtures_dir: Path, tmp_path: Pat
     shown: list[str] = []
 
     def run(*arguments: object, code: int = 0) -> str:
-        done = teamclone(*arguments, "--store", url, code=code)
+        done = called(*arguments, "--store", url, code=code)
         shown.extend((done.stdout, done.stderr))
         return done.stdout
 
@@ -89,7 +89,7 @@ def test_every_command_takes_the_url(url: str, fixtures_dir: Path, tmp_path: Pat
     assert report["matches"] == {"added": 1, "replaced": 0, "unchanged": 0}
     assert "1 there before" in run("ingest", logs)
     assert json.loads(run("matches", "--json")) == json.loads(
-        teamclone("matches", "--json", "--store", reference.location).stdout
+        called("matches", "--json", "--store", reference.location).stdout
     )
     query = "select count(*) as n, max(stamina) as best, sum(count_dash) as dashes from player_states"
     (row,) = json.loads(run("sql", query, "--json"))
@@ -107,8 +107,8 @@ def test_a_dataset_is_the_same_from_either_store(url: str, samples: Path, refere
     assert ingest([samples], create_store(url), jobs=1).added == N_MATCHES
     same(open_store(url), reference)
     config = DatasetConfig(teams=("HELIOS_base",))
-    for name, store in (("parquet", reference), ("postgresql", open_store(url))):
-        build_dataset(config, store=store, out=tmp_path / name)
+    for name, store, jobs in (("parquet", reference, 1), ("postgresql", open_store(url), 2)):
+        build_dataset(config, store=store, out=tmp_path / name, jobs=jobs)
     files = {path.relative_to(tmp_path / "parquet") for path in (tmp_path / "parquet").rglob("*") if path.is_file()}
     assert {path.suffix for path in files} >= {".npy", ".json"}
     assert files == {

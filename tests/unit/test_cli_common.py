@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from command import teamclone
+from command import called
 from teamclone.cli.common import fail, print_json, print_table, progress, visible
 
 EVIL = "\x1b]0;title\x07\x1b[2JRed\x9b31m\u202eder"
@@ -35,14 +35,14 @@ def test_a_log_with_an_evil_team(tmp_path: Path, fixtures_dir: Path) -> None:
     name = "\x1b]0;title\x07Evil"
     (tmp_path / "x.rcg").write_bytes(gzip.decompress(log.read_bytes()).replace(b"HELIOS_base", name.encode()))
     shutil.copy(tmp_path / "x.rcg", tmp_path / f"{EVIL}.rcg")
-    teamclone("ingest", tmp_path / "x.rcg", "--store", tmp_path / "store")
+    called("ingest", tmp_path / "x.rcg", "--store", tmp_path / "store")
     for arguments in (
         *(("info", tmp_path), ("info", tmp_path, "--json"), ("validate", tmp_path)),
         *(("matches", "--store", tmp_path / "store"), ("matches", "--store", tmp_path / "store", "--json")),
         ("sql", "select left_name from matches", "--store", tmp_path / "store"),
         ("sql", "select left_name from matches", "--store", tmp_path / "store", "--json"),
     ):
-        done = teamclone(*arguments)
+        done = called(*arguments)
         assert not {*done.stdout, *done.stderr} & {*"\x1b\x07\x9b\u202e"}, arguments
         assert "title" in done.stdout or arguments[0] == "validate"
 

@@ -194,11 +194,12 @@ def test_the_quick_case_needs_no_schedule(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_whole_schedule_runs_and_what_is_there_is_kept(tmp_path: Path, server: str) -> None:
     more = (
+        "[[pairings]]\nleft = 'Green'\nright = 'Red'\n"
         "[dataset]\nteams = 'Red'\ntest = 0.2\nvalidation = 0.2\nunseen = 'Green'\n"
         "[train]\npreset = 'small'\nset = ['train.epochs=1', 'data.batches_per_epoch=2', 'data.batch_size=64']\n"
     )
-    pairings = [("Red", "Blue"), ("Green", "Red")]
-    schedule = write_schedule(tmp_path, pairings, server=server, matches=3, more=more)
+    teams = {"Green": TEAM}
+    schedule = write_schedule(tmp_path, [("Red", "Blue")], server=server, teams=teams, matches=3, more=more)
     out = tmp_path / "out"
 
     def stages() -> dict[str, bool]:

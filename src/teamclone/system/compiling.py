@@ -14,7 +14,8 @@ from typing import Any
 from numba import njit
 from numba.core import event
 
-kernel: Any = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+_MORE: dict[str, Any] = {"no_cfunc_wrapper": True}  # which Numba's type hints lack
+kernel: Any = njit(nogil=True, error_model="numpy", **_MORE)
 """Compiles a function that other kernels call. It is not cached, since the cache does not see which calls which: the
 kernel that Python calls is cached with all of them. What such functions may use: `teamclone.export.rules`. Wrappers for
 callers in C, of which there are none, would be compiled with all that they call, too."""

@@ -62,7 +62,7 @@ def _tell_without_cache() -> None:
     """Warn once, and not from every worker."""
     if multiprocessing.parent_process() is None:
         logging.getLogger(__name__).warning(
-            "no folder to keep compiled code in, so every start compiles anew, up to a minute: "
+            "no folder to keep compiled code in, so every start compiles anew, some minutes: "
             "set NUMBA_CACHE_DIR to a folder that can be written"
         )
 

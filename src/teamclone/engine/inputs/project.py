@@ -149,7 +149,7 @@ def _compiled() -> Any:
 
 
 _project_all = _compiled()
-tell_when_compiled({_project_all: "compiling the inputs of the network, once (about a minute)"})
+tell_when_compiled({_project_all: "compiling the inputs of the network, once (three to four minutes)"})
 
 
 def as_arrays(frames: Frames) -> Frames:

@@ -41,7 +41,7 @@ def _compiled() -> tuple[Any, Any]:
 
 
 _answer_all, _sample_all = _compiled()
-tell_when_compiled({_answer_all: "compiling the layers of networks, once (some seconds)"})
+tell_when_compiled({_answer_all: "compiling the layers of networks, once (about a minute)"})
 
 
 class Network:

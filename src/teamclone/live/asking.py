@@ -37,8 +37,13 @@ def ask(
     return clone.answers(frames, np.zeros(len(actor), np.int64), actor)
 
 
-def load_kernels(clone: CompiledClone, *, history: int) -> None:
-    """Load or compile what `ask` calls, which else happens in the first cycle."""
+def load_kernels(clone: CompiledClone, *, history: int) -> Floats:
+    """Load or compile what `ask` calls, which else happens in the first cycle.
+
+    Returns:
+        (1, N_OUT) an answer to a frame without anything.
+    """
     frames = {name: np.zeros(1, np.int32) for name in FRAME_COLUMNS}
     players = {name: np.zeros((1, N_PLAYERS), np.int32) for name in PLAYER_COLUMNS}
-    ask(clone, view_columns(frames, players, params={}, side=1), np.zeros(1, np.int64), history=history)
+    answers, _ = ask(clone, view_columns(frames, players, params={}, side=1), np.zeros(1, np.int64), history=history)
+    return answers

@@ -63,7 +63,8 @@ class Decisions:
 
     def load(self) -> None:
         """Load or compile the kernels, which else happens at the first answer; use it before time matters."""
-        load_kernels(self._clone, history=HISTORY)
+        answers = load_kernels(self._clone, history=HISTORY)
+        self._clone.network.samples(answers, np.zeros((len(answers), UNIFORMS)))
 
     def of(
         self, world: World, unums: Sequence[int], *, movers: Collection[int] = (), catchers: Collection[int] = ()

@@ -13,8 +13,6 @@ export class Capture {
   constructor(pitch, match, clock, onChange) {
     Object.assign(this, { pitch, match, clock, onChange });
     this.recorder = null;
-    // Set when the clip shall end: the moment after which nothing more is waited for.
-    this.endBefore = null;
   }
 
   get recording() {
@@ -70,19 +68,10 @@ export class Capture {
     }
     const stream = this.compose().captureStream(CLIP_RATE);
     const recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: 6_000_000 });
-    const parts = [];
+    const parts = (this.parts = []);
     const name = this.name(type.startsWith("video/mp4") ? "mp4" : "webm");
     recorder.addEventListener("dataavailable", (event) => {
       if (event.data.size) parts.push(event.data);
-      if (this.endBefore === null || recorder.state === "inactive") return;
-      if (parts.length || performance.now() > this.endBefore) {
-        recorder.stop();
-        return;
-      }
-      setTimeout(() => {
-        this.compose();
-        recorder.requestData();
-      }, ASK_MS);
     });
     recorder.addEventListener("stop", () => {
       clearTimeout(this.limit);
@@ -98,16 +87,21 @@ export class Capture {
     });
     recorder.start(1000);
     this.recorder = recorder;
-    this.endBefore = null;
     this.limit = setTimeout(() => this.finish(), LONGEST_S * 1000);
     this.onChange("Recording.");
   }
 
   /** End the clip as soon as it has a picture: what is stopped before the encoder gave its first is an empty file. */
-  finish() {
-    if (this.endBefore !== null) return;
-    this.endBefore = performance.now() + PATIENCE_MS;
+  finish(lastly = performance.now() + PATIENCE_MS) {
+    if (this.recorder?.state !== "recording") return;
+    if (this.parts.length || performance.now() > lastly) {
+      this.recorder.stop();
+      return;
+    }
+    this.compose();
     this.recorder.requestData();
+    clearTimeout(this.limit);
+    this.limit = setTimeout(() => this.finish(lastly), ASK_MS);
   }
 
   /** After each picture of the pitch. */

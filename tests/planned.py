@@ -1,4 +1,7 @@
-"""Plans of many scenes by Numba, compiled once and kept on disk; most of it is what the inputs of networks compile."""
+"""Plans of many scenes by Numba, compiled once and kept on disk; most of it is what the inputs of networks compile.
+
+`engine.inputs.project.plans` takes frames of single precision and plans near the ball alone; tests ask for more.
+"""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ import pytest
 
 import teamclone as tc
 from command import TEAMCLONE, teamclone
-from playing import STANDIN, both_servers, strays, write_schedule
+from playing import STANDIN, both_servers, write_schedule
 from teamclone.dataset.build import DatasetConfig
 from teamclone.logs import read_match
 from teamclone.logs.match import Match
@@ -30,6 +30,8 @@ from teamclone.rcss.players import N_TEAM
 from teamclone.store import create_store
 from teamclone.training.config import load_config
 from teamclone.training.line_up import LineUp, read_line_up
+
+pytestmark = pytest.mark.usefixtures("nothing_stays")
 
 SETTINGS = (
     *("model.blocks=self,role,ball,mode", "model.kick_blocks=self,ball,mode", "model.target_points=2"),
@@ -49,12 +51,6 @@ def run(tmp_path_factory: pytest.TempPathFactory, samples_dir: Path) -> Path:
     config = DatasetConfig(teams=("HELIOS_base",), goalkeepers=True, set_plays=True, idle=True)
     tc.build_dataset(config, store=store, out=folder / "ds", jobs=1)
     return tc.train(load_config("play", SETTINGS), tc.open_dataset(folder / "ds"), folder / "run").path
-
-
-@pytest.fixture(autouse=True)
-def _nothing_stays(tmp_path: Path) -> Iterator[None]:
-    yield
-    assert strays(tmp_path) == []
 
 
 def command(run: Path, *more: str) -> str:

@@ -48,6 +48,8 @@ def situations(n: int, *, seed: int = 0, history: int = 0, dtype: torch.dtype = 
     for flag, share in ((FLAG_TACKLING, 0.05), (FLAG_COLLIDED, 0.1)):
         players[..., CHANNEL["flags"]] += flag * (uniform(0, 1, n, 22) < share)
     kinds = torch.tensor((0, *CLONED_KINDS), dtype=dtype)
+    ages = torch.Generator().manual_seed(seed)
+    players[..., CHANNEL["age"]] = torch.randint(40, (n, 22), generator=ages).to(dtype)
     players[..., CHANNEL["last_command"]] = kinds[torch.randint(0, len(kinds), (n, 22), generator=generator)]
 
     types = torch.tensor(list(DEFAULTS.values()), dtype=dtype).repeat(n, 22, 1)

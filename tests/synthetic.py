@@ -43,6 +43,7 @@ def make_dataset(
         "type": rng.integers(0, N_TYPES, (n, 22)),
         "flags": np.broadcast_to(FLAG_ON_FIELD + FLAG_GOALIE * (np.arange(22) % 11 == 0), (n, 22)),
         "last_command": rng.choice([int(kind) for kind in (0, *CLONED_KINDS, CommandKind.CATCH)], (n, 22)),
+        "age": np.zeros((n, 22)),
     }
     detail = np.stack([np.rint(values[channel.name] / STEP[channel.name]) for channel in MEASURED], -1)
     code = np.stack([values[name] for name in CATEGORICAL_INDEX], -1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from teamclone import plot
-    from teamclone.api import LoadedClone, load, match_events
+    from teamclone.api import LoadedClone, load, match_events, match_percepts
     from teamclone.comparison.compare import Comparison, compare, write_comparison
     from teamclone.dataset.build import DatasetConfig, build_dataset
     from teamclone.dataset.reader import Dataset, open_dataset
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from teamclone.events.statistics import TeamStatistics, team_statistics
     from teamclone.events.table import MatchEvents
     from teamclone.logs import Match, find_matches, read_match
+    from teamclone.percepts.table import MatchPercepts
     from teamclone.replay.page import make_replay
     from teamclone.report.page import make_report
     from teamclone.scout.scout import scout_team
@@ -45,6 +46,8 @@ _HOME = {
     "Match": "logs",
     "match_events": "api",
     "MatchEvents": "events.table",
+    "match_percepts": "api",
+    "MatchPercepts": "percepts.table",
     "team_statistics": "events.statistics",
     "TeamStatistics": "events.statistics",
     "Rules": "dynamics.rules",
@@ -91,6 +94,7 @@ __all__ = [
     "Logged",
     "Match",
     "MatchEvents",
+    "MatchPercepts",
     "PredictionTable",
     "Rules",
     "Run",
@@ -108,6 +112,7 @@ __all__ = [
     "make_replay",
     "make_report",
     "match_events",
+    "match_percepts",
     "open_dataset",
     "open_run",
     "open_store",

@@ -11,6 +11,7 @@ from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.prediction_table import PredictionTable, predict_match
 from teamclone.events.table import MatchEvents
 from teamclone.logs import Match, read_match
+from teamclone.percepts.table import MatchPercepts
 from teamclone.store.events import read_events
 from teamclone.training.run import Run, open_run
 
@@ -118,6 +119,18 @@ def match_events(match: Match | Path | str, *, store: Store | None = None) -> Ma
         right=row["right_name"],
         columns=read_events(store, row["match_id"]),
     )
+
+
+def match_percepts(match: Match | Path | str) -> MatchPercepts:
+    """Work out what each player of a match saw, and where it believes ball and other players to be.
+
+    Args:
+        match: a match, or the path of its game log.
+
+    Raises:
+        LogError: the log cannot be read, has no frame, or does not show where players look.
+    """
+    return MatchPercepts.of(match if isinstance(match, Match) else read_match(match))
 
 
 def _columns(match: Match | Path | str, store: Store | None) -> MatchColumns:

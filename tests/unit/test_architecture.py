@@ -17,7 +17,7 @@ PACKAGE = "teamclone"
 SOURCE = Path(__file__).resolve().parents[2] / "src" / PACKAGE
 
 BASE = ("errors", "system", "rcss")
-READING = (*BASE, "logs", "world", "events", "store")
+READING = (*BASE, "logs", "world", "percepts", "events", "store")
 CLONING = ("dataset", "play", "models", "training", "export", "search", "evaluation")
 MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "errors": (),
@@ -28,6 +28,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "dynamics": ("errors", "rcss", "logs.columns", "logs.match", "logs.align"),
     "protocol": (*BASE, "logs"),
     "world": ("rcss", "dynamics", "logs.columns", "logs.match", "logs.align"),
+    "percepts": (*BASE, "logs", "world"),
     "events": (*BASE, "logs", "dynamics"),
     "store": (*BASE, "logs", "dynamics", "events"),
     "dataset": (*READING, "dynamics"),
@@ -38,7 +39,7 @@ MAY_IMPORT: Mapping[str, tuple[str, ...]] = {
     "training": (*BASE, "world", "dataset", "engine", "models"),
     "export": (*BASE, "planner", "engine", "world", "dataset", "models", "training"),
     "search": (*BASE, "plots", "dataset", "engine.network.constants", "models", "training"),
-    "evaluation": (*BASE, "plots", "logs", "dynamics", "world", "store", "dataset", "engine", "models", "training"),
+    "evaluation": (*READING, "plots", "dynamics", "dataset", "engine", "models", "training"),
     "rollouts": (*BASE, "plots", "logs", "dynamics", "world", "models", "evaluation"),
     "report": (*BASE, "plots", "models", "training", "evaluation", "rollouts"),
     "comparison": (*READING, "plots", "play.holes", "evaluation.bootstrap"),

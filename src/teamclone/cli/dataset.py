@@ -44,6 +44,12 @@ def dataset(
     idle: Annotated[
         bool, typer.Option("--idle", help="Take cycles without a body command as samples of a command none.")
     ] = False,
+    percepts: Annotated[
+        bool,
+        typer.Option(
+            "--percepts", help="Take situations as players without the full state believe them, from what they saw."
+        ),
+    ] = False,
     test: Annotated[float, typer.Option(help="Share of the matches for the test.", min=0, max=0.9)] = 0.15,
     validation: Annotated[float, typer.Option(help="Share of the matches for validation.", min=0, max=0.9)] = 0.15,
     test_match: Annotated[
@@ -75,6 +81,7 @@ def dataset(
         goalkeepers=goalkeepers,
         set_plays=set_plays,
         idle=idle,
+        percepts=percepts,
         test_matches=tuple(test_match or ()),
         validation_matches=tuple(validation_match or ()),
         test=test,

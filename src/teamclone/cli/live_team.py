@@ -53,6 +53,7 @@ def team(
             f"{run}: this clone knows no {' and no '.join(missing)}, so it cannot play whole matches; make its dataset "
             "with `teamclone dataset --goalkeepers --set-plays --idle` and train it with --preset play"
         )
+    clone.model.need_log_view("a full state")
     line_up = read_line_up(clone.run.path)
     called = name or line_up.team
     if not NAME.fullmatch(called):

@@ -24,6 +24,8 @@ from teamclone.dynamics.rules import check_parameters
 from teamclone.errors import DatasetError, UsageError, choose
 from teamclone.logs.columns import COMMANDS, INTERVALS, Source, counter_name
 from teamclone.logs.match import empty_columns
+from teamclone.percepts import sight
+from teamclone.percepts.believed import perceive
 from teamclone.rcss import server_params
 from teamclone.rcss.commands import CLONED, REPERTOIRE, CommandKind
 from teamclone.rcss.player_types import DEFAULTS, FIELDS
@@ -78,6 +80,8 @@ class DatasetConfig:
         goalkeepers: model goalkeepers like the other players, in every split, and ``catch`` as a command.
         set_plays: take the commands of all play modes that have a Situation, not only of play_on, and ``move`` as one.
         idle: take cycles without a body command as samples of ``none``.
+        percepts: take the situation of a sample as its player believes it, from what it saw (`percepts`), not as the
+            log has it: for teams that play without the full state.
         test_matches, validation_matches: match ids or parts of log names that must fall there; the other split
             shares are then drawn from the rest.
         test, validation: share of the matches.
@@ -94,6 +98,7 @@ class DatasetConfig:
     goalkeepers: bool = False
     set_plays: bool = False
     idle: bool = False
+    percepts: bool = False
     test_matches: tuple[str, ...] = ()
     validation_matches: tuple[str, ...] = ()
     test: float = setting(0.15, at_least=0, at_most=MAX_SHARE)
@@ -162,6 +167,7 @@ class _Task:
     recover: bool
     goalkeepers: bool
     repertoire: tuple[str, ...]
+    percepts: bool
 
 
 def build_dataset(
@@ -251,6 +257,7 @@ def _tasks(
             recover=config.source is Sources.RECOVERED and entry.source is not Source.RECOVERED,
             goalkeepers=config.train_goalkeepers and splits[entry.match_id] is layout.Split.TRAIN,
             repertoire=config.repertoire,
+            percepts=config.percepts,
         )
         for entry in entries
     ]
@@ -317,7 +324,7 @@ def _options(config: DatasetConfig) -> dict[str, Any]:
     """Return a config as the dataset keeps it: options beyond play_on only where they are on."""
     options = asdict(config)
     teams = options.pop("teams")
-    for name in ("goalkeepers", "set_plays", "idle"):
+    for name in ("goalkeepers", "set_plays", "idle", "percepts"):
         if not options[name]:
             del options[name]
     return {"team": teams if len(teams) > 1 else config.team, **options}
@@ -340,7 +347,8 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     params = store.read_parameters(match_id)["server"]
     types = store.read_match_columns(match_id, "player_types", columns=FIELDS)
     frames = store.read_match_columns(match_id, "frames", columns=FRAME_COLUMNS)
-    players = store.read_match_columns(match_id, "player_states", columns=PLAYER_COLUMNS)
+    columns = dict.fromkeys((*PLAYER_COLUMNS, *(sight.PLAYER_COLUMNS if task.percepts else ())))
+    players = store.read_match_columns(match_id, "player_states", columns=tuple(columns))
     left_out = None
     try:
         check_parameters(params, types)
@@ -357,6 +365,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     else:
         intervals = [column.name for column in INTERVALS] if task.entry.source is Source.RECOVERED else []
         commands = store.read_match_columns(match_id, "commands", columns=(*clean.COMMAND_COLUMNS, *intervals))
+    memory = perceive(frames, players, types=types, params=params)[1] if task.percepts and left_out is None else None
     samples = clean.clean_match(
         frames,
         players,
@@ -368,6 +377,7 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
         turn_zero=task.turn_zero,
         goalkeepers=task.goalkeepers,
         repertoire=task.repertoire,
+        memory=memory,
     )
     if left_out is not None:  # nor do its cycles count among those that have no command
         samples = changed(samples, player_cycles=0, idle=0, frozen=0, odd_frames=0)

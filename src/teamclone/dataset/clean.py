@@ -16,6 +16,8 @@ from teamclone.logs import columns
 from teamclone.logs.align import executed_commands, executed_kind, first_body_commands, follows, slot_of
 from teamclone.logs.columns import counter_name
 from teamclone.logs.match import Columns
+from teamclone.percepts.believed import Believed
+from teamclone.percepts.memory import Memory
 from teamclone.rcss import state_bits
 from teamclone.rcss.commands import BODY_KINDS, CLONED, CommandKind
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
@@ -70,7 +72,7 @@ class MatchSamples:
 
     Attributes:
         frames: layout.FRAME_ARRAYS without ``match``, only frames that have a sample.
-        kept: (n,) which frames of the match these are.
+        kept: (n,) which frames of the match these are, one several times where samples have frames of their own.
         samples: layout.SAMPLE_ARRAYS without ``split``; ``frame`` counts from this match's first kept frame.
         rules: every cleaning step in order.
         player_cycles: cycles x players of the team on the field, of those players and in those play modes that the
@@ -101,6 +103,7 @@ def clean_match(
     turn_zero: TurnZero = TurnZero.KEEP,
     goalkeepers: bool = False,
     repertoire: tuple[str, ...] = CLONED,
+    memory: Memory | None = None,
 ) -> MatchSamples:
     """Clean and bind the commands of one team in one match.
 
@@ -114,6 +117,7 @@ def clean_match(
         repertoire: the commands to keep, some of REPERTOIRE. With catch goalkeepers are modelled like other players;
             with move every play mode of a Situation is taken, not only play_on; with none a cycle without a body
             command is a sample.
+        memory: what the players believe: each sample then has a frame of its own, as its player believes it.
     """
     everyone = "catch" in repertoire
     in_play, whole = frames_in_play(frames, repertoire), whole_frames(frames, players, n_types=n_types)
@@ -150,8 +154,13 @@ def clean_match(
         samples = _with_none(samples, nothing, kind=repertoire.index("none"))
     order = np.lexsort((samples["player"], samples["frame"]))
     samples = {name: values[order] for name, values in samples.items()}
-    kept, local = np.unique(samples["frame"], return_inverse=True)
-    world = view_columns(frames, players, params=server_params, side=side).select(kept)
+    world = view_columns(frames, players, params=server_params, side=side)
+    if memory is None:
+        kept, local = np.unique(samples["frame"], return_inverse=True)
+        world = world.select(kept)
+    else:
+        kept, local = samples["frame"], np.arange(len(samples["frame"]))
+        world = Believed(world=world, memory=memory).select(kept, samples["player"].astype(np.int64))
     return MatchSamples(
         frames=_frames(world, frames["playmode"][kept]),
         kept=kept,

@@ -20,7 +20,7 @@ import numpy as np
 from teamclone.rcss.players import N_TEAM
 from teamclone.world.channels import CATEGORICAL, MEASURED
 
-FORMAT = 4
+FORMAT = 5
 """Raised whenever a reader of the old layout would misread the new one."""
 
 

@@ -97,6 +97,12 @@ class Dataset:
         return tuple(self.meta.get("commands", CLONED))
 
     @property
+    def percepts(self) -> bool:
+        """Whether each sample has the situation as its player believes it."""
+        options = self.meta.get("options")
+        return isinstance(options, dict) and bool(options.get("percepts"))
+
+    @property
     def matches(self) -> list[dict[str, Any]]:
         """The matches: ``match_id``, ``opponent``, ``side``, ``split`` and more of each."""
         return list(self.meta["matches"])
@@ -127,8 +133,13 @@ class Dataset:
         """Raise unless the frames of samples hold the ball and some of CHANNEL: not every log has all.
 
         Raises:
-            DatasetError: a match lacks one.
+            DatasetError: a match lacks one, or the age of what players see is asked for where they see everything.
         """
+        if "age" in channels and not self.percepts:
+            raise DatasetError(
+                f"{self.path}: has situations as the log has them, the model knows them as players believe them; "
+                "make the dataset with --percepts"
+            )
         frames = np.unique(self.samples["frame"].numpy()[rows])
         for start in range(0, len(frames), CHECKED_FRAMES):
             part = frames[start : start + CHECKED_FRAMES]
@@ -158,7 +169,14 @@ class Dataset:
 
         Args:
             history: how many frames before each to give too.
+
+        Raises:
+            DatasetError: frames before are asked for, of a dataset that has none.
         """
+        if history and self.percepts:
+            raise DatasetError(
+                f"{self.path}: situations as players believe them have no past; leave the block past out"
+            )
         rows = torch.as_tensor(rows)
         frame, place = torch.unique(self.samples["frame"].index_select(0, rows).long(), return_inverse=True)
         match = self.frames["match"].index_select(0, frame).long()

@@ -19,6 +19,7 @@ from teamclone.evaluation.answers import Answers, answers
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.predictions import issued_parameters
 from teamclone.logs.columns import INTERVALS, Source
+from teamclone.percepts.believed import Believed, perceive
 from teamclone.rcss.commands import parameters_of
 from teamclone.rcss.players import N_TEAM
 from teamclone.rcss.playmodes import PlayMode
@@ -127,8 +128,13 @@ def predict_match(
     done = _done(match, frame, actor, side=side, commands=commands, goalkeepers=goalkeepers)
     near = near_the_ball(world, frame, actor)
 
+    believed = _believed(match, world) if model.perceives else None
+
     def state_of(part: slice) -> State:
-        return State.of(world, frame[part], actor[part], history=model.inputs.history)
+        if believed is None:
+            return State.of(world, frame[part], actor[part], history=model.inputs.history)
+        of_part = believed.select(frame[part], actor[part])
+        return State.of(of_part, np.arange(len(of_part)), actor[part])
 
     def target_of(part: slice) -> Target:
         kind, arguments = torch.from_numpy(done.kind[part].clip(min=0)), torch.from_numpy(done.arguments[part])
@@ -154,6 +160,12 @@ def predict_match(
         for column, of in enumerate(parameters):
             table = table.append_column(f"{of.name}_spread", _or_null(spread[:, column]))
     return PredictionTable(table)
+
+
+def _believed(match: MatchColumns, world: World) -> Believed:
+    """Return a match as its players believe it."""
+    _, memory = perceive(match.frames, match.players, types=match.types, params=match.params)
+    return Believed(world=world, memory=memory)
 
 
 def near_the_ball(world: World, frame: NDArray[np.int64], actor: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -112,6 +112,7 @@ class _Watcher:
     def __init__(self, run: Run, config: WatchConfig, checkpoint: str, on_event: Callable[[Happening], None]) -> None:
         self._config, self._tell = config, on_event
         model = run.load_model(checkpoint).eval()
+        model.need_log_view("a match that is watched")
         self._clone = CompiledClone(pack(model))
         self._parameters = parameters_of(self._clone.commands)
         self._reads: dict[str, Any] = {"history": model.inputs.history, "channels": model.inputs.channels}

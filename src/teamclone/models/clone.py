@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from teamclone.engine.network.constants import TARGET_COLUMNS
+from teamclone.errors import UsageError
 from teamclone.models.answer import Answer, Prediction
 from teamclone.models.config import (
     EgocentricConfig,
@@ -125,6 +126,23 @@ class Clone(nn.Module):
                 # Keras' default, with which the paper trained.
                 nn.init.xavier_uniform_(module.weight)
                 nn.init.zeros_(module.bias)
+
+    @property
+    def perceives(self) -> bool:
+        """Whether it knows situations as players believe them from what they saw, not as logs have them."""
+        return "age" in self.inputs.channels
+
+    def need_log_view(self, purpose: str) -> None:
+        """Raise if the clone cannot do with situations as logs and full states have them.
+
+        Raises:
+            UsageError: it `perceives`. ``purpose`` is what it was wanted for.
+        """
+        if self.perceives:
+            raise UsageError(
+                f"this clone knows situations as players believe them, which {purpose} cannot give it yet; "
+                "train one on a dataset made without --percepts"
+            )
 
     @property
     def inputs(self) -> Features:

@@ -96,12 +96,14 @@ FURTHER: dict[str, float] = {
     "minneckang": -90.0,
     "maxneckmoment": 180.0,
     "minneckmoment": -180.0,
+    "quantize_step": 0.1,
     "slowness_on_top_for_left_team": 1.0,
     "slowness_on_top_for_right_team": 1.0,
     "team_actuator_noise": 0.0,
     "wind_rand": 0.0,
 }
-"""Defaults of parameters that only the step of a cycle needs (`dynamics`): no dataset and no model has them."""
+"""Defaults of parameters that no dataset and no model has: of the step of a cycle (`dynamics`), of what players see
+(`percepts`)."""
 
 _NEW_IN = (
     ("dist_noise_rate", 19),

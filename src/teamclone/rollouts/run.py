@@ -119,6 +119,9 @@ def roll_out(
         UsageError: the team does not play, the log does not state its rules, or no play goes on for a cycle.
         LogError: the log cannot be read.
     """
+    for one in (model, other):
+        if one is not None:
+            one.need_log_view("a roll-out")
     match = read_match(path)
     ours = MatchColumns.of(match).side_of(team, side)
     rules = rules_of(match.game.server_params, match.game.player_types)

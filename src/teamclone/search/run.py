@@ -28,7 +28,7 @@ from teamclone.search.worker import Ended, Epoch, Worker
 from teamclone.system.workers import available_cpus
 from teamclone.training.config import differences
 from teamclone.training.run import locked
-from teamclone.training.setup import check_commands
+from teamclone.training.setup import check_fits
 
 
 def search(
@@ -55,7 +55,7 @@ def search(
         UsageError: options that do not go together, or a dataset of other commands than the model's.
         RunError: the folder holds something else, or a search that does not fit; or another process searches in it.
     """
-    check_commands(config.base, dataset)
+    check_fits(config.base, dataset)
     # Without them hours of training would end in an error.
     for module in ("matplotlib", *(("optuna",) if config.mode is Mode.STUDY else ())):
         import_module(module)

@@ -76,7 +76,7 @@ def prepare(
     Args:
         on_progress: called with the samples whose inputs are made, and their number.
     """
-    check_commands(config, dataset, adapting=base is not None)
+    check_fits(config, dataset, adapting=base is not None)
     device, precision = _resources(config.train)
     group = stack.enter_context(joined(device))
     rows = dataset.split(Split.TRAIN)
@@ -141,8 +141,8 @@ def prepare(
     )
 
 
-def check_commands(config: Config, dataset: Dataset, *, adapting: bool = False) -> None:
-    """See that the model answers with what the dataset has.
+def check_fits(config: Config, dataset: Dataset, *, adapting: bool = False) -> None:
+    """See that the model answers with what the dataset has, and knows what its situations are.
 
     Raises:
         UsageError: it does not.
@@ -154,6 +154,11 @@ def check_commands(config: Config, dataset: Dataset, *, adapting: bool = False) 
             remedy = "make the dataset with the options of that of the base"
         raise UsageError(
             f"{dataset.path}: has the commands {', '.join(there)}, the model is for {', '.join(answers)}; {remedy}"
+        )
+    if dataset.percepts and "age" not in getattr(config.model, "blocks", ()):
+        raise UsageError(
+            f"{dataset.path}: has situations as players believe them, of which a model without the block age knows "
+            "nothing; take --preset tournament"
         )
 
 

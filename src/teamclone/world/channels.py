@@ -40,6 +40,12 @@ CATEGORICAL = (
         unit="",
         about="command kind id that the server executed between the previous frame and this one; 0 none",
     ),
+    Channel(
+        name="age",
+        unit="cycle",
+        about="where the frame is what one player believes: cycles since that player saw this one, and at its own "
+        "place since it saw the ball; 0 where the frame is as the log has it",
+    ),
 )
 """Counts and codes of a player; NaN where the log lacks them."""
 

@@ -92,6 +92,7 @@ def view_columns(
     made[..., CHANNEL["flags"]] = sum(
         (np.where((state & bits) != 0, flag, 0) for flag, bits in _FLAGS), np.zeros(state.shape, np.int64)
     )
+    made[..., CHANNEL["age"]] = 0
     executed = executed_kind(frames, players)
     made[:1, :, CHANNEL["last_command"]] = 0
     made[1:, :, CHANNEL["last_command"]] = executed[:-1, axis]

@@ -387,4 +387,4 @@ def test_a_real_match_keeps_the_world_through_the_dataset(real: Any) -> None:
         assert np.abs((difference + 180) % 360 - 180).max() < 0.0051
         size = sum(values.nbytes for values in (*result.frames.values(), *result.samples.values()))
         # A cycle of play_on; a full match has some 5000.
-        assert size / len(frame) < 920
+        assert size / len(frame) < 945

@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.engine.inputs.frame import COS, FLAGS, LAST_LINE, NECK, SIN, TO_BALL, VIEW_WIDTH, Frame, whole
+from teamclone.engine.inputs.frame import AGE, COS, FLAGS, LAST_LINE, NECK, SIN, TO_BALL, VIEW_WIDTH, Frame, whole
 from teamclone.engine.inputs.layout import (
+    AGED_MATES,
     COMMANDS,
     MATES,
     MODES,
@@ -401,6 +402,26 @@ def put_mode(flags: int, mode: int, cycles: float, out: Out, at: int) -> int:
     """Write the play mode one-hot, how long it has lasted, whether the actor is the goalkeeper."""
     at = put_one_hot(out, at, _MODE_COLUMN[mode], MODES)
     return put(out, at, (min(cycles, 10.0) / 10, min(cycles, 100.0) / 100, one_if((flags & FLAG_GOALIE) != 0)))
+
+
+@kernel
+def _put_ages(frame: Frame, order: Order, count: int, out: Out, at: int) -> int:
+    """Write how long ago the first ``count`` of an order were seen, 0 where there are fewer; then the mean of all."""
+    total = 0.0
+    for place in range(max(count, order.number)):
+        age = math.log1p(frame.more[order.rows[place], AGE]) if place < order.number else 0.0
+        total += age
+        if place < count:
+            out[at + place] = age
+    return put(out, at + count, (total / max(order.number, 1),))
+
+
+@kernel
+def put_age(frame: Frame, view: Look, out: Out, at: int) -> int:
+    """Write how long ago the actor saw the ball, team mates and opponents, the logarithm of one more cycle."""
+    at = put(out, at, (math.log1p(frame.more[view.actor, AGE]),))
+    at = _put_ages(frame, view.mates, AGED_MATES, out, at)
+    return _put_ages(frame, view.opponents, NEAREST_OPPONENTS, out, at)
 
 
 @kernel

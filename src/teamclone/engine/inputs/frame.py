@@ -26,14 +26,14 @@ from teamclone.rcss.players import N_PLAYERS
 from teamclone.system.compiling import kernel
 from teamclone.world.channels import CHANNEL
 
-COS, SIN, TO_BALL, NECK, VIEW_WIDTH, FLAGS, LAST, MORE = range(8)
+COS, SIN, TO_BALL, NECK, VIEW_WIDTH, FLAGS, LAST, AGE, MORE = range(9)
 """Columns of ``Frame.more``: of the body direction; metres between player and ball; channels that a scene lacks."""
 DEFENDERS, LAST_LINE = 0, 1
 """Of ``Frame.lines``, x: the second last opponent; the second last of the team or the ball, at most the middle."""
 FAR_M = 100.0
 """Farther than anything on the pitch; the place of players off the field."""
 
-_NECK, _VIEW, _FLAGS, _LAST = (CHANNEL[name] for name in ("neck", "view_width", "flags", "last_command"))
+_NECK, _VIEW, _FLAGS, _LAST, _AGE = (CHANNEL[name] for name in ("neck", "view_width", "flags", "last_command", "age"))
 
 
 class Frame(NamedTuple):
@@ -98,6 +98,7 @@ def fill_frame(frame: Frame, ball: Array, players: Array, types: Array, server: 
         more[row, TO_BALL] = gap(scene[row, X], scene[row, Y], scene[BALL, X], scene[BALL, Y])
         more[row, NECK], more[row, VIEW_WIDTH] = players[row, _NECK], players[row, _VIEW]
         more[row, FLAGS], more[row, LAST] = whole(players[row, _FLAGS]), whole(players[row, _LAST])
+        more[row, AGE] = whole(players[row, _AGE])
     frame.lines[DEFENDERS] = _second(scene, OPPONENT, BALL, 1.0)
     frame.lines[LAST_LINE] = min(-max(_second(scene, 0, OPPONENT, -1.0), 0.0), scene[BALL, X])
     frame.known[:] = False

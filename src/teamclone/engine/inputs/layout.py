@@ -14,7 +14,7 @@ from teamclone.rcss.playmodes import Situation
 
 BLOCKS = (
     "self", "role", "type", "last", "view", "ball", "reach", "lines", "plan", "mates", "opponents", "rivals", "past",
-    "mode",
+    "mode", "age",
 )  # fmt: skip
 """Blocks that a network may have, in the order of their columns; ``core`` comes before them in all networks."""
 MATES = N_TEAM - 1
@@ -23,6 +23,8 @@ NEAREST_OPPONENTS = 6
 RIVALS = 3
 """Opponents in the blocks ``opponents`` and ``rivals``."""
 PAST_FRAMES = 3
+AGED_MATES = 4
+"""Team mates, the nearest, in the block ``age``; opponents are NEAREST_OPPONENTS."""
 TYPE_PARAMETERS = tuple(name for group in GROUPS.values() for name in group)
 """Parameters of the actor's type in the block ``type``."""
 SIDED_SITUATION = Situation.KICK_OFF
@@ -50,6 +52,7 @@ WIDTH = {
     "rivals": PLAYER * RIVALS,
     "past": PAST_FRAMES * (11 + COMMANDS + 2 + 1),
     "mode": MODES + 3,
+    "age": 1 + AGED_MATES + NEAREST_OPPONENTS + 2,
 }
 """Columns of each block, in their order."""
 

@@ -22,7 +22,7 @@ from teamclone.system.compiling import cached_kernel, kernel, tell_when_compiled
 from teamclone.world import channels
 
 (CORE, SELF, ROLE, TYPE, LAST_COMMANDS, VIEW, BALL_SEEN, REACH, LINES, PLAN_SEEN, MATES, OPPONENTS, RIVALS, PAST, MODE,
- GEOMETRY, OTHERS, WAYS) = range(len(PARTS))  # fmt: skip
+ AGE_SEEN, GEOMETRY, OTHERS, WAYS) = range(len(PARTS))  # fmt: skip
 """Places of PARTS."""
 Places = NDArray[np.int64]
 
@@ -72,6 +72,8 @@ def fill_actor(frame: Frame, view: Look, planned: Array, places: Places, out: bl
         blocks.put_opponents(frame, view, out, places[OPPONENTS])
     if places[RIVALS] >= 0:
         blocks.put_rivals(frame, view, out, places[RIVALS])
+    if places[AGE_SEEN] >= 0:
+        blocks.put_age(frame, view, out, places[AGE_SEEN])
     blocks.put_geometry(frame, view, out, places[GEOMETRY])
     if places[OTHERS] >= 0:
         blocks.put_others(frame, view, out, places[OTHERS])

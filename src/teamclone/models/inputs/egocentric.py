@@ -46,6 +46,7 @@ class EgocentricFeatures(nn.Module):
         self.channels = (
             *("x", "y", "vx", "vy", "body", "stamina", "effort", "recovery", "capacity", "type", "flags"),
             *(("neck", "view_width") if "view" in blocks else ()),
+            *(("age",) if "age" in blocks else ()),
             "last_command",
         )
         widths = {name: WIDTH[name] for name in ("core", *self.blocks)}

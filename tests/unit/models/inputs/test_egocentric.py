@@ -402,7 +402,7 @@ def moved(state: State, *, degrees: float, by: tuple[float, float]) -> State:
 def test_what_is_relative_does_not_see_where_on_the_pitch(degrees: float, by: tuple[float, float]) -> None:
     state = situations(200, history=PAST_FRAMES, dtype=torch.float64)
     before, after = (whole().project(each) for each in (state, moved(state, degrees=degrees, by=by)))
-    for name in ("role", "type", "last", "view", "ball", "reach", "mates", "opponents", "rivals", "past"):
+    for name in ("role", "type", "last", "view", "ball", "reach", "mates", "opponents", "rivals", "past", "age"):
         # A place on the pitch has single precision, some micrometres; a direction to the ball makes degrees of them.
         assert torch.allclose(part(before, name), part(after, name), atol=1e-4), name
     # Of himself all but the two of the body direction.
@@ -453,7 +453,7 @@ def test_normalised_inputs_are_mirrored_by_their_signs() -> None:
 
 
 def test_channels_are_those_that_the_blocks_look_at() -> None:
-    for blocks in ((), ("self", "mates", "past"), ("view",)):
+    for blocks in ((), ("self", "mates", "past"), ("view",), ("age",)):
         features = EgocentricFeatures(blocks)
         state = situations(5, history=features.history)
         before = features.project(state)
@@ -462,10 +462,13 @@ def test_channels_are_those_that_the_blocks_look_at() -> None:
             players[..., unread] = math.nan
         assert torch.equal(features.project(state), before)
         assert ("neck" in features.channels) == ("view_width" in features.channels) == ("view" in blocks)
+        assert ("age" in features.channels) == ("age" in blocks)
 
 
 MEETING = {"core", "reach", "geometry", "lines", "mates", "opponents", "rivals"}
 """Blocks that hang on times to the ball, which hang on where everybody is."""
+NEAREST = MEETING | {"age"}
+"""Blocks that hang on who is the nearest, too."""
 
 
 def of_server(state: State, name: str) -> Tensor:
@@ -500,10 +503,13 @@ def renumbered(state: State, one: int, other: int) -> None:
         ("others' stamina", lambda s: s.players[:, 3:, CHANNEL["stamina"]].sub_(9), set(), set()),
         ("a mate's kick", lambda s: s.players[:, 5, CHANNEL["last_command"]].fill_(CommandKind.KICK), {"last"}, set()),
         ("a mate's body", lambda s: s.players[:, 5, CHANNEL["body"]].add_(31), {"mates"}, MEETING),
-        ("mates' place", lambda s: s.players[:, 3:11, CHANNEL["x"]].add_(0.5), {"mates", "geometry"}, MEETING),
+        ("mates' place", lambda s: s.players[:, 3:11, CHANNEL["x"]].add_(0.5), {"mates", "geometry"}, NEAREST),
         ("opponents' body", lambda s: s.players[:, 11:, CHANNEL["body"]].add_(31), {"opponents", "rivals"}, MEETING),
-        ("opponents' place", lambda s: s.players[:, 11:, CHANNEL["y"]].add_(0.5), {"opponents", "rivals"}, MEETING),
+        ("opponents' place", lambda s: s.players[:, 11:, CHANNEL["y"]].add_(0.5), {"opponents", "rivals"}, NEAREST),
         ("ball", lambda s: s.ball[:, 0].add_(0.5), {"ball"} | MEETING, set()),
+        ("ball's age", lambda s: s.players[:, 2, CHANNEL["age"]].add_(3), {"age"}, set()),
+        ("a mate's age", lambda s: s.players[:, 5, CHANNEL["age"]].add_(3), {"age"}, set()),
+        ("an opponent's age", lambda s: s.players[:, 15, CHANNEL["age"]].add_(3), {"age"}, set()),
         ("past ball", lambda s: s.past_ball[:, 2].add_(0.5), {"past"}, set()),
         ("own past", lambda s: s.past_players[:, 1, 2, CHANNEL["vx"]].add_(0.1), {"past"}, set()),
         ("play mode", lambda s: s.mode.fill_(PlayMode.KICK_IN_R), {"mode"}, set()),
@@ -539,6 +545,19 @@ def test_each_value_moves_its_own_blocks_only(
     different = {name for name in PARTS if not torch.equal(part(before, name), part(after, name))}
     assert different >= must, what
     assert different <= must | may, what
+
+
+def test_ages_are_those_of_the_ball_of_the_nearest_and_of_all() -> None:
+    state = standing()
+    state.players[0, :, CHANNEL["flags"]] = FLAG_ON_FIELD
+    state.players[0, 11:, CHANNEL["flags"]] = 0
+    state.players[0, 1:11, CHANNEL["x"]] = torch.arange(10.0)  # number 11 is the nearest
+    state.players[0, :11, CHANNEL["age"]] = torch.arange(11.0)
+    state.players[0, 0, CHANNEL["age"]] = 7.0  # of the ball
+    seen = part(whole().project(state), "age")[0].expm1()
+    assert seen[:5].tolist() == pytest.approx([7.0, 10.0, 9.0, 8.0, 7.0], rel=1e-5)
+    assert float(seen[5].log1p()) == pytest.approx(float(torch.arange(1.0, 11.0).log1p().mean()), rel=1e-5)
+    assert seen[6:].tolist() == [0.0] * 7
 
 
 def test_one_who_tackles_does_not_hold_the_ball() -> None:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-_OFFLINE_LOG = re.compile(r"-\d+\.ocl(\.\w+)?$")
-"""Names of players' logs; their coach writes TEAM-coach.ocl."""
-
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from teamclone.percepts.agreement import Agreement
     from teamclone.percepts.table import FoundPercepts, KnownAtAge
+
+_OFFLINE_LOG = re.compile(r"-\d+\.ocl(\.\w+)?$")
+"""Names of players' logs; their coach writes TEAM-coach.ocl."""
 
 
 def percepts(

@@ -349,9 +349,11 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     frames = store.read_match_columns(match_id, "frames", columns=FRAME_COLUMNS)
     columns = dict.fromkeys((*PLAYER_COLUMNS, *(sight.PLAYER_COLUMNS if task.percepts else ())))
     players = store.read_match_columns(match_id, "player_states", columns=tuple(columns))
-    left_out = None
+    left_out, memory = None, None
     try:
         check_parameters(params, types)
+        if task.percepts:
+            _, memory = perceive(frames, players, types=types, params=params)
     except UsageError as error:  # what no match has would spoil the samples of all others
         left_out = str(error)
     if left_out is not None:
@@ -365,7 +367,6 @@ def _clean(task: _Task) -> tuple[MatchSamples, _Parameters]:
     else:
         intervals = [column.name for column in INTERVALS] if task.entry.source is Source.RECOVERED else []
         commands = store.read_match_columns(match_id, "commands", columns=(*clean.COMMAND_COLUMNS, *intervals))
-    memory = perceive(frames, players, types=types, params=params)[1] if task.percepts and left_out is None else None
     samples = clean.clean_match(
         frames,
         players,

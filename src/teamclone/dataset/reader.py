@@ -129,12 +129,20 @@ class Dataset:
         """Return the samples of a split, ascending."""
         return np.flatnonzero(self.samples["split"].numpy() == int(split))
 
-    def need(self, channels: Sequence[str], rows: NDArray[np.int64]) -> None:
+    def need(self, channels: Sequence[str], rows: NDArray[np.int64], *, history: int = 0) -> None:
         """Raise unless the frames of samples hold the ball and some of CHANNEL: not every log has all.
 
+        Args:
+            history: how many frames before each are needed, too.
+
         Raises:
-            DatasetError: a match lacks one, or the age of what players see is asked for where they see everything.
+            DatasetError: a match lacks one, or the age of what players see is asked for where they see everything, or
+                frames before where players believe what they see.
         """
+        if history and self.percepts:
+            raise DatasetError(
+                f"{self.path}: situations as players believe them have no past; leave the block past out"
+            )
         if "age" in channels and not self.percepts:
             raise DatasetError(
                 f"{self.path}: has situations as the log has them, the model knows them as players believe them; "
@@ -168,15 +176,8 @@ class Dataset:
         """Return the situations in which the commands of these samples were decided, in the order asked for.
 
         Args:
-            history: how many frames before each to give too.
-
-        Raises:
-            DatasetError: frames before are asked for, of a dataset that has none.
+            history: how many frames before each to give too; with `percepts` none is known.
         """
-        if history and self.percepts:
-            raise DatasetError(
-                f"{self.path}: situations as players believe them have no past; leave the block past out"
-            )
         rows = torch.as_tensor(rows)
         frame, place = torch.unique(self.samples["frame"].index_select(0, rows).long(), return_inverse=True)
         match = self.frames["match"].index_select(0, frame).long()
@@ -190,6 +191,7 @@ class Dataset:
         for name, step in (("match", 0), ("cycle", 1)):
             value = self.frames[name]
             known &= value[past] == value[frame][:, None] - step * back
+        known &= not self.percepts  # the frame before is what somebody else believed
         past = torch.where(known, past, frame[:, None]).reshape(-1)
         return State(
             ball=self.frames["ball"].index_select(0, frame),

@@ -87,7 +87,7 @@ def measure_latency(
     if not len(dataset):
         raise DatasetError(f"{dataset.path}: no samples to predict; build the dataset from more matches")
     rows = np.random.default_rng(seed).choice(len(dataset), N_STATES + N_PLAYERS)
-    dataset.need(model.inputs.channels, rows)
+    dataset.need(model.inputs.channels, rows, history=model.inputs.history)
     starts, history = range(N_STATES), model.inputs.history
     singles = [dataset.state(rows[start : start + 1], history=history) for start in starts]
     teams = [dataset.state(rows[start : start + N_PLAYERS], history=history) for start in starts]

@@ -43,7 +43,7 @@ def predict(
     Raises:
         DatasetError: a match lacks what the model needs.
     """
-    dataset.need(model.inputs.channels, rows)
+    dataset.need(model.inputs.channels, rows, history=model.inputs.history)
 
     def inputs_of(part: slice) -> State | torch.Tensor:
         return dataset.state(rows[part], history=model.inputs.history) if inputs is None else inputs[part]

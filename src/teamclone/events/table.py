@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from teamclone.errors import LogError, UsageError, choose
+from teamclone.errors import LogError
 from teamclone.events.definitions import COLUMNS, EventKind
 from teamclone.events.find import find_events
 from teamclone.events.statistics import MatchStatistics, team_statistics
-from teamclone.logs import LogPair, Match, read_pair
+from teamclone.logs import LogPair, Match
+from teamclone.logs.each import check_teams, of_each
 from teamclone.logs.match import Columns
-from teamclone.system.tables import check_suffix, writing
+from teamclone.system.tables import writing_if
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -142,30 +142,11 @@ def events_of_logs(
         UsageError: the ending of ``out`` is unknown, or a team plays in none of the matches.
     """
     results = []
-    with ExitStack() as stack:
-        write = None
-        if out is not None:
-            check_suffix(out)
-            write = stack.enter_context(writing(out))
-        for done, pair in enumerate(pairs):
-            if on_progress is not None:
-                on_progress(done, len(pairs))
-            try:
-                found = MatchEvents.of(read_pair(pair))
-            except (LogError, OSError) as error:
-                results.append(FoundEvents(path=pair.path, error=str(error)))
-                continue
-            results.append(FoundEvents(path=pair.path, events=found))
-            if write is not None:
+    with writing_if(out) as write:
+        for path, found, error in of_each(pairs, MatchEvents.of, on_progress=on_progress):
+            results.append(FoundEvents(path=path, events=found, error=error))
+            if found is not None and write is not None:
                 write(found.select(kinds=kinds, teams=teams).to_arrow())
-        _check_teams(teams, results)
-    if on_progress is not None:
-        on_progress(len(pairs), len(pairs))
+        events = [one.events for one in results if one.events is not None]
+        check_teams(teams, {name for one in events for name in (one.left, one.right) if name})
     return results
-
-
-def _check_teams(teams: Collection[str], results: Sequence[FoundEvents]) -> None:
-    there = {name for one in results if one.events is not None for name in (one.events.left, one.events.right) if name}
-    for team in teams:
-        if there and team not in there:
-            raise UsageError(f"no team {team!r} plays in these matches; {choose(team, sorted(there))}")

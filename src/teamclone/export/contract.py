@@ -204,7 +204,7 @@ def samples_of(run: Run, model: Clone, n: int) -> Arrays:
     first = [order[near[order]][: n // 4], order[~near[order]]]
     chosen = np.sort(np.concatenate(first)[:n])
     part = state.select(torch.from_numpy(chosen)).each()
-    data.need(model.inputs.channels, rows[chosen])
+    data.need(model.inputs.channels, rows[chosen], history=model.inputs.history)
     return {name: getattr(part, name).contiguous().numpy().astype(kind) for name, kind in ARRAYS.items()}
 
 

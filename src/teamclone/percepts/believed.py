@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.logs.match import Columns
+from teamclone.errors import UsageError
+from teamclone.logs.match import Columns, default_player_types
 from teamclone.percepts.memory import Memory, remember
 from teamclone.percepts.sight import BALL, Sight, sight
-from teamclone.rcss import player_types
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.reference_frame import rotate_angle, rotate_point
 from teamclone.world.channels import CHANNEL
@@ -27,11 +27,15 @@ def perceive(
     Args:
         frames: `sight.FRAME_COLUMNS`, (n_frames,). players: `sight.PLAYER_COLUMNS` and ``type``, (n_frames, 22).
         types: the column ``player_decay`` of the player types, (n_types,). params: the server's parameters.
+
+    Raises:
+        UsageError: the log does not show where players look.
     """
+    for name in ("neck", "view_width"):
+        if np.isnan(players[name]).all():
+            raise UsageError(f"the log does not show {name}: logs of version 3 and later do")
     seen = sight(frames, players, params)
-    decays = np.asarray(types["player_decay"], np.float64)
-    if not len(decays):
-        decays = np.array([player_types.DEFAULTS["player_decay"]])
+    decays = (types if len(types["player_decay"]) else default_player_types(1))["player_decay"]
     decay = decays[np.minimum(players["type"], len(decays) - 1)]
     return seen, remember(frames, players, seen, decay=decay, params=params)
 

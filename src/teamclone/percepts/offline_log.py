@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from teamclone.errors import LogError
 from teamclone.logs.inflate import read_bytes
 
-_INIT = re.compile(rb"\((?:init|reconnect) ([lr]) (\d{1,2}) ")
+_INIT = re.compile(rb"\((?:init|reconnect) ([lr]) (1[01]|[1-9]) ")
 _STAMP = re.compile(rb"\((sense_body|see) (\d{1,9}) ")
 _OBJECT = re.compile(
     rb'\(\((?:(?P<ball>[bB])|(?P<player>[pP])(?: "(?P<team>[^"]*)"(?: (?P<unum>\d{1,2})(?: goalie)?)?)?)\)'

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from teamclone import rcss
 from teamclone.logs.align import follows
 from teamclone.logs.match import Columns
 from teamclone.percepts import vision
@@ -16,6 +17,7 @@ from teamclone.percepts.vision import VISIBLE_DISTANCE_M, in_cone, shown_change,
 from teamclone.rcss import state_bits
 from teamclone.rcss.players import N_PLAYERS
 from teamclone.rcss.server_params import number
+from teamclone.system import compiling
 from teamclone.system.compiling import cached_kernel, version_of
 
 N_OBJECTS = N_PLAYERS + 1
@@ -43,7 +45,11 @@ FRAME_COLUMNS = ("cycle", "stoppage", "ball_x", "ball_y", "ball_vx", "ball_vy")
 INTERVAL_DEG = 60.0
 """View width for each cycle between two visual messages: narrow 60 comes every cycle, wide 180 every third one."""
 
-_X, _Y, _VX, _VY, _SIGHT, _WIDTH, _FOCUS_X, _FOCUS_Y, _THERE = range(9)
+X, Y, VX, VY, BODY, SIGHT, VIEW_WIDTH, FOCUS_X, FOCUS_Y, THERE, COLUMNS = range(11)
+"""Columns of `objects_of`: place and velocity; of players the body direction, degrees, and in radians the line of sight
+and the view width; their focus point; whether it is on the field."""
+_FARTHEST = 1e6
+"""No place and no velocity of a log that can be is greater."""
 
 
 class Sight(NamedTuple):
@@ -78,8 +84,8 @@ def sight(frames: Columns, players: Columns, params: Mapping[str, float | str]) 
         params: the server's parameters as the log lists them.
     """
     n = len(frames["ball_x"])
-    objects = _objects(frames, players)
-    there = objects[:, :BALL, _THERE] > 0
+    objects = objects_of(frames, players)
+    there = objects[:, :BALL, THERE] > 0
     received, sure = messages(players["view_width"], there, follows(frames))
     shape = (n, N_PLAYERS, N_OBJECTS)
     made = Sight(
@@ -94,21 +100,26 @@ def sight(frames: Columns, players: Columns, params: Mapping[str, float | str]) 
     return made
 
 
-def _objects(frames: Columns, players: Columns) -> NDArray[np.float64]:
-    """Return (n_frames, N_OBJECTS, 9) what the messages of a frame depend on."""
-    made = np.zeros((len(frames["ball_x"]), N_OBJECTS, 9))
-    for place, name in ((_X, "x"), (_Y, "y"), (_VX, "vx"), (_VY, "vy")):
+def objects_of(frames: Columns, players: Columns) -> NDArray[np.float64]:
+    """Return (n_frames, N_OBJECTS, COLUMNS) of players and ball what percepts follow from.
+
+    What has a place or a velocity that cannot be is not there, and has zeros: a player would believe it for long.
+    """
+    made = np.zeros((len(frames["ball_x"]), N_OBJECTS, COLUMNS))
+    for place, name in ((X, "x"), (Y, "y"), (VX, "vx"), (VY, "vy")):
         made[:, :BALL, place] = players[name]
         made[:, BALL, place] = frames[f"ball_{name}"]
     looking = np.radians(players["body"].astype(np.float64) + players["neck"])
     to_focus = np.nan_to_num(players["focus_distance"].astype(np.float64))
     focus = looking + np.radians(np.nan_to_num(players["focus_direction"].astype(np.float64)))
-    made[:, :BALL, _SIGHT] = looking
-    made[:, :BALL, _WIDTH] = np.radians(players["view_width"].astype(np.float64))
-    made[:, :BALL, _FOCUS_X] = players["x"] + to_focus * np.cos(focus)
-    made[:, :BALL, _FOCUS_Y] = players["y"] + to_focus * np.sin(focus)
-    made[:, :BALL, _THERE] = (players["state"] & state_bits.STAND) != 0
-    made[:, BALL, _THERE] = 1
+    made[:, :BALL, BODY] = players["body"]
+    made[:, :BALL, SIGHT] = looking
+    made[:, :BALL, VIEW_WIDTH] = np.radians(players["view_width"].astype(np.float64))
+    made[:, :BALL, FOCUS_X] = players["x"] + to_focus * np.cos(focus)
+    made[:, :BALL, FOCUS_Y] = players["y"] + to_focus * np.sin(focus)
+    made[:, :BALL, THERE] = (players["state"] & state_bits.STAND) != 0
+    made[:, BALL, THERE] = 1
+    made[~(np.abs(made[..., : BODY + 1]) < _FARTHEST).all(axis=-1)] = 0
     return made
 
 
@@ -141,33 +152,38 @@ def messages(
     return received, sure
 
 
-@cached_kernel(nogil=True, error_model="numpy")
-def _see(objects: NDArray[np.float64], step: float, sight: Sight) -> int:
-    """Fill in what is shown, from `_objects`; ``step`` is that of `vision.shown_distance`."""
-    for frame in range(objects.shape[0]):
-        for player in range(N_PLAYERS):
-            if not sight.received[frame, player]:
-                continue
-            me = objects[frame, player]
-            for other in range(N_OBJECTS):
-                it = objects[frame, other]
-                if other == player or it[_THERE] == 0:
+def _compiled() -> Any:
+    """Return a kernel that fills in what is shown."""
+    version = version_of(vision, rcss, compiling)
+
+    @cached_kernel(nogil=True, error_model="numpy")
+    def see(objects: NDArray[np.float64], step: float, sight: Sight) -> int:
+        for frame in range(objects.shape[0]):
+            for player in range(N_PLAYERS):
+                if not sight.received[frame, player]:
                     continue
-                x, y = it[_X] - me[_X], it[_Y] - me[_Y]
-                metres, angle = math.hypot(x, y), shown_direction(x, y, me[_SIGHT])
-                seen = in_cone(angle, me[_WIDTH])
-                if not seen and metres > VISIBLE_DISTANCE_M:
-                    continue
-                to_focus = math.hypot(it[_X] - me[_FOCUS_X], it[_Y] - me[_FOCUS_Y])
-                shown = shown_distance(metres, to_focus, step)
-                sight.what[frame, player, other] = SEEN if seen else NEAR
-                sight.distance[frame, player, other] = shown
-                sight.direction[frame, player, other] = round(math.degrees(angle))
-                if seen and metres > 0:
-                    motion = it[_VX] - me[_VX], it[_VY] - me[_VY]
-                    away, aside = shown_change((x, y), motion, metres, shown)
-                    sight.change[frame, player, other, 0], sight.change[frame, player, other, 1] = away, aside
-    return _VERSION
+                me = objects[frame, player]
+                for other in range(N_OBJECTS):
+                    it = objects[frame, other]
+                    if other == player or it[THERE] == 0:
+                        continue
+                    x, y = it[X] - me[X], it[Y] - me[Y]
+                    metres, angle = math.hypot(x, y), shown_direction(x, y, me[SIGHT])
+                    seen = in_cone(angle, me[VIEW_WIDTH])
+                    if not seen and metres > VISIBLE_DISTANCE_M:
+                        continue
+                    to_focus = math.hypot(it[X] - me[FOCUS_X], it[Y] - me[FOCUS_Y])
+                    shown = shown_distance(metres, to_focus, step)
+                    sight.what[frame, player, other] = SEEN if seen else NEAR
+                    sight.distance[frame, player, other] = shown
+                    sight.direction[frame, player, other] = round(math.degrees(angle))
+                    if seen and metres > 0:
+                        motion = it[VX] - me[VX], it[VY] - me[VY]
+                        away, aside = shown_change((x, y), motion, metres, shown)
+                        sight.change[frame, player, other, 0], sight.change[frame, player, other, 1] = away, aside
+        return version
+
+    return see
 
 
-_VERSION = version_of(vision)
+_see = _compiled()

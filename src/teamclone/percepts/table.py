@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,17 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.errors import LogError, UsageError, choose
-from teamclone.logs import LogPair, Match, read_pair
+from teamclone.errors import LogError, UsageError
+from teamclone.logs import LogPair, Match
+from teamclone.logs.each import check_teams, of_each
 from teamclone.percepts.agreement import Agreement, agreement
 from teamclone.percepts.believed import perceive
 from teamclone.percepts.memory import MAX_AGE, Memory
 from teamclone.percepts.offline_log import read_offline_log
-from teamclone.percepts.sight import BALL, N_OBJECTS, Sight
+from teamclone.percepts.sight import BALL, N_OBJECTS, Sight, X, Y, objects_of
 from teamclone.rcss import state_bits
 from teamclone.rcss.players import N_PLAYERS, N_TEAM
 from teamclone.rcss.playmodes import PlayMode
-from teamclone.system.tables import check_suffix, writing
+from teamclone.system.tables import writing_if
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -85,11 +85,11 @@ class MatchPercepts:
         path = match.rcg_path or match.rcl_path
         if not len(match.frames["cycle"]):
             raise LogError("expected frames to see something in, the log has none; name its game log (.rcg)", path=path)
-        for name in ("neck", "view_width"):
-            if np.isnan(match.players[name]).all():
-                raise LogError(f"the log does not show {name}: logs of version 3 and later do", path=path)
         game = match.game
-        seen, memory = perceive(game.frames, game.players, types=game.player_types, params=game.server_params)
+        try:
+            seen, memory = perceive(game.frames, game.players, types=game.player_types, params=game.server_params)
+        except UsageError as error:
+            raise LogError(str(error), path=path) from error
         return cls(match=match, sight=seen, memory=memory)
 
     def teams(self) -> list[TeamPercepts]:
@@ -118,9 +118,7 @@ class MatchPercepts:
 
     def _error(self, frame: NDArray[np.int64], player: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return (n, N_OBJECTS) metres between believed and true places, as players see them."""
-        truth = np.stack(
-            [np.column_stack([self.match.players[axis], self.match.frames[f"ball_{axis}"]]) for axis in "xy"], axis=-1
-        )
+        truth = objects_of(self.match.frames, self.match.players)[..., [X, Y]]
         return np.linalg.norm(self.memory.place[frame, player] - truth[frame], axis=-1).astype(np.float32)
 
     def agreement(self, path: Path) -> Agreement:
@@ -189,16 +187,10 @@ class MatchPercepts:
 def _by_age(age: NDArray[np.uint8], error: NDArray[np.float32]) -> tuple[KnownAtAge, ...]:
     made = []
     for first, last in AGES:
-        these = (age >= first) & (age <= last)
-        found = error[these]
-        made.append(
-            KnownAtAge(
-                first=first,
-                last=last,
-                share=float(these.mean()) if len(age) else float("nan"),
-                error_m=float(np.median(found)) if len(found) else float("nan"),
-            )
-        )
+        found = error[(age >= first) & (age <= last)]
+        share = len(found) / len(age) if len(age) else float("nan")
+        middle = float(np.median(found)) if len(found) else float("nan")
+        made.append(KnownAtAge(first=first, last=last, share=share, error_m=middle))
     return tuple(made)
 
 
@@ -247,28 +239,19 @@ def percepts_of_logs(
         raise UsageError(f"logs of players are of one match, got {len(pairs)}; name its game log")
     results: list[FoundPercepts] = []
     names: set[str] = set()
-    with ExitStack() as stack:
-        write = None
-        if out is not None:
-            check_suffix(out)
-            write = stack.enter_context(writing(out))
-        for done, pair in enumerate(pairs):
-            if on_progress is not None:
-                on_progress(done, len(pairs))
-            try:
-                found = MatchPercepts.of(read_pair(pair))
-            except (LogError, OSError) as error:
-                results.append(FoundPercepts(path=pair.path, error=str(error)))
+    with writing_if(out) as write:
+        for path, found, error in of_each(pairs, MatchPercepts.of, on_progress=on_progress):
+            if found is None:
+                results.append(FoundPercepts(path=path, error=error))
                 continue
             known = found.teams()
             names.update(team.team for team in known)
-            shown = tuple(team for team in known if not teams or team.team in teams)
             compared, faults = _compared(found, offline_logs)
             results.append(
                 FoundPercepts(
-                    path=pair.path,
+                    path=path,
                     match_id=found.match.match_id,
-                    teams=shown,
+                    teams=tuple(team for team in known if not teams or team.team in teams),
                     agreement=compared,
                     faults=tuple(faults),
                 )
@@ -276,11 +259,7 @@ def percepts_of_logs(
             if write is not None:
                 for table in found.tables(teams=teams):
                     write(table)
-        for team in teams:
-            if names and team not in names:
-                raise UsageError(f"no team {team!r} plays in these matches; {choose(team, sorted(names))}")
-    if on_progress is not None:
-        on_progress(len(pairs), len(pairs))
+        check_teams(teams, names)
     return results
 
 

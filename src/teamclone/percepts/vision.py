@@ -28,12 +28,6 @@ def rounded(value: float, step: float) -> float:
 
 
 @kernel
-def _turned(angle: float) -> float:
-    """Return an angle from -pi to pi."""
-    return math.atan2(math.sin(angle), math.cos(angle))
-
-
-@kernel
 def _grid(distance: float, step: float) -> float:
     """Return a distance whose logarithm is in whole steps."""
     return math.exp(rounded(math.log(distance + _NOT_ZERO), step))
@@ -72,7 +66,8 @@ def shown_direction(x: float, y: float, sight: float) -> float:
     Args:
         x, y: from the player to the object. sight: body and neck direction.
     """
-    return _turned(math.atan2(y, x) - sight)
+    cos, sin = math.cos(sight), math.sin(sight)
+    return math.atan2(y * cos - x * sin, x * cos + y * sin)
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -45,6 +45,18 @@ class _JsonLines:
 
     def close(self) -> None:
         self._file.close()
+
+
+def writing_if(out: Path | None) -> AbstractContextManager[Callable[[pa.Table], None] | None]:
+    """Return what `writing` does for a file that was asked for, None for none.
+
+    Raises:
+        UsageError: the ending of its name is none of SUFFIXES.
+    """
+    if out is None:
+        return nullcontext()
+    check_suffix(out)
+    return writing(out)
 
 
 @contextmanager

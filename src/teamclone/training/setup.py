@@ -100,7 +100,7 @@ def prepare(
     model = Clone(config.model).to(device)
     optimiser = optimiser_of(config.train, model, precision=precision)
     for split_rows in (rows, validation_rows):
-        dataset.need(model.inputs.channels, split_rows)
+        dataset.need(model.inputs.channels, split_rows, history=model.inputs.history)
     batches = Batches(
         dataset,
         model,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from teamclone.dataset.reader import Dataset, open_dataset
 from teamclone.errors import DatasetError, UsageError
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.prediction_table import predict_match
+from teamclone.export.contract import samples_of
 from teamclone.logs import Match, read_match
 from teamclone.models.clone import Clone
 from teamclone.models.config import EgocentricConfig
@@ -23,6 +25,7 @@ from teamclone.percepts.sight import BALL
 from teamclone.rcss.reference_frame import rotate_angle, rotate_point
 from teamclone.store import create_store
 from teamclone.training.config import Config
+from teamclone.training.run import Run
 from teamclone.training.setup import check_fits
 from teamclone.world.channels import CHANNEL
 from teamclone.world.view import view
@@ -152,7 +155,28 @@ def test_a_model_and_a_dataset_that_do_not_go_together_are_told(datasets: dict[b
         check_fits(replace(Config(), model=small(("self",))), datasets[True])
     check_fits(replace(Config(), model=small(BLOCKS)), datasets[True])
     with pytest.raises(DatasetError, match="leave the block past out"):
-        datasets[True].state(rows, history=3)
+        datasets[True].need(("x",), rows, history=3)
+    late = np.arange(len(datasets[True]) - 10, len(datasets[True]))
+    assert not datasets[True].state(late, history=3).past_known.any()
+    assert datasets[False].state(late, history=3).past_known.any()
+
+
+def test_a_match_whose_log_does_not_show_where_players_look_is_left_out(match: Match, tmp_path: Path) -> None:
+    players = {**match.game.players, "neck": np.full_like(match.game.players["neck"], np.nan)}
+    blind = replace(match, match_id="b" * 16, game=replace(match.game, players=players))
+    store = create_store(tmp_path / "store")
+    for one in (match, blind):
+        store.add(one)
+    report = build_dataset(DatasetConfig(teams=(TEAM,), percepts=True), store=store, out=tmp_path / "ds", jobs=1)
+    left_out = {row["match_id"]: row["left_out"] for row in report["matches"]}
+    assert left_out == {match.match_id: None, "b" * 16: "the log does not show neck: logs of version 3 and later do"}
+
+
+def test_a_contract_of_an_export_has_states_as_players_believe_them(datasets: dict[bool, Dataset]) -> None:
+    run = cast(Run, SimpleNamespace(dataset_path=datasets[True].path))
+    samples = samples_of(run, Clone(small(BLOCKS)), 20)
+    assert samples["players"][..., CHANNEL["age"]].max() > 0
+    assert not samples["past_known"].any()
 
 
 def test_who_needs_beliefs_is_not_asked_where_there_are_none() -> None:

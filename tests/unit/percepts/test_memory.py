@@ -52,6 +52,21 @@ def test_what_was_never_seen_has_the_greatest_age() -> None:
     assert (believed(frames, players).age[:, 0, BALL] == MAX_AGE).all()
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e38])
+@pytest.mark.parametrize("name", ["ball_x", "ball_vx"])
+def test_an_impossible_number_is_not_believed(name: str, value: float) -> None:
+    """Else it would be believed for as long as the ball is not seen."""
+    frames, players = rolling(6)
+    whole = believed(frames, players)
+    players["neck"][2, 0] = 0.0
+    frames[name][2] = value
+    broken = believed(frames, players)
+    assert (broken.age[:, 0, BALL] == whole.age[:, 0, BALL]).all()
+    assert broken.place[:, 0, BALL] == pytest.approx(whole.place[:, 0, BALL])
+    frames[name][0] = value
+    assert np.isfinite(believed(frames, players).place).all()
+
+
 def test_a_player_knows_itself() -> None:
     frames, players = situation(3, vx=0.3)
     players["x"][:, 0] = [0.0, 0.3, 0.6]

@@ -168,6 +168,8 @@ def test_a_log_that_was_cut_off_counts_as_far_as_it_goes(tmp_path: Path, logs: d
     [
         b"\x00\xff" * 100,
         b"(init l 7 before_kick_off)\n",
+        b"(init l 99 before_kick_off)\n(sense_body 1 )\n",
+        b"(init l 0 before_kick_off)\n(sense_body 1 )\n",
         b"(sense_body 1 (view_mode high wide))\n(see 1 ((b) 1 2))\n",
         b"(init l 7 before_kick_off)\n(sense_body 99999999999999999999 )\n(see 1 ((b) 1 2))\n",
     ],

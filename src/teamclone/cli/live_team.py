@@ -69,10 +69,14 @@ def team(
         port=port,
         coach_port=min(port + 2, 65535) if coach_port is None else coach_port,
     )
+    usual = signal.getsignal(signal.SIGINT)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, playing.stop)
     try:
         playing.play(connect_s=connect_s)
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)  # what is left is to say what became of it
+        signal.signal(signal.SIGINT, usual)
         _report(playing.summary, called, as_json=as_json)
 
 

@@ -104,17 +104,28 @@ class Team:
         self._world: LiveWorld | None = None
         self._cycle, self._blind = -1, 0
         self._moved_at: dict[int, int] = {}
+        self._stopped = False
         self.summary = Summary()
+
+    def stop(self, *_: object) -> None:
+        """Have `play` end before its next cycle with KeyboardInterrupt; fit for a handler of signals.
+
+        An error that a handler raises may come while a kernel makes its result in Python, and that ends the process.
+        """
+        self._stopped = True
 
     def play(self, *, connect_s: float = CONNECT_S) -> Summary:
         """Take part in a match until it is over.
 
         Raises:
             LiveError: the server is not there, refuses the team, sends no full state, or goes away during the match.
+            KeyboardInterrupt: after `stop`.
         """
         begun = time.monotonic()
         try:
             while not self._ended():
+                if self._stopped:
+                    raise KeyboardInterrupt
                 if not self._seats.side and time.monotonic() - begun > connect_s:
                     raise LiveError(
                         f"no server answers at {self._seats.where} after {connect_s:g} s; "

@@ -202,8 +202,8 @@ def _features(config: ModelConfig) -> PaperFeatures | EgocentricFeatures:
     if isinstance(config, PaperConfig):
         return PaperFeatures(own_type=config.own_type, all_types=config.all_types)
     config = cast(EgocentricTrunkConfig, config)
-    attention = isinstance(config, EgocentricConfig) and config.kick_attention > 0
-    return EgocentricFeatures(tuple({*config.blocks, *_kick_blocks(config)}), others=attention)
+    others = isinstance(config, EgocentricConfig) and max(config.kick_attention, config.kick_candidates) > 0
+    return EgocentricFeatures(tuple({*config.blocks, *_kick_blocks(config)}), others=others)
 
 
 def _kick_blocks(config: EgocentricTrunkConfig) -> tuple[str, ...]:
@@ -231,6 +231,8 @@ def _head(config: ModelConfig) -> PointHead | MixtureHead:
         kick_width=config.kick_hidden[-1] + config.kick_attention,
         target_width=config.kick_attention,
         planned="plan" in config.kick_blocks,
+        candidates=config.kick_candidates,
+        candidate_dropout=config.kick_dropout,
         target_points=config.target_points,
         commands=config.commands,
         parameter_weight=config.parameter_weight,

@@ -130,6 +130,8 @@ class EgocentricConfig(EgocentricTrunkConfig):
         kick_dropout: `dropout` of these, of which there are few examples.
         kick_attention: numbers by which these layers know each other player; see `layers.players.PlayerEncoder`.
             A multiple of ATTENTION_HEADS; 0 for no such layers.
+        kick_candidates: width of the layers that score some hundred candidates of each kick, made by physics alone;
+            see `engine.network.candidates`. 0 for none.
         target_weight: of the error by which turns teach the target points, if there are any, in training.
         extra_kicks: kicks and tackles shown beside each batch to the layers that find their parameters.
     """
@@ -141,6 +143,7 @@ class EgocentricConfig(EgocentricTrunkConfig):
     kick_hidden: tuple[int, ...] = setting((512, 256), at_least=1, at_most=MOST_WIDTH, some=True, most=MOST_LAYERS)
     kick_dropout: float = setting(0.3, at_least=0, at_most=0.9)
     kick_attention: int = setting(64, at_least=0, at_most=4096, rule=_attention)
+    kick_candidates: int = setting(0, at_least=0, at_most=1024)
     target_weight: float = setting(0.1, at_least=0)
     extra_kicks: int = setting(64, at_least=0, at_most=1 << 20)
 

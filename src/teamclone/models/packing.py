@@ -91,6 +91,7 @@ def _shape(model: Clone) -> Shape:
             "kick_hidden": config.kick_hidden,
             "attention": config.kick_attention,
             "planned": "plan" in config.kick_blocks,
+            "candidates": config.kick_candidates,
         }
         if isinstance(config, EgocentricConfig)
         else {}
@@ -165,6 +166,14 @@ def _mixture_rows(trunk: EgocentricTrunk, head: MixtureHead) -> Iterator[tuple[i
             of.HEARD: players.heard,
             of.THINK_IN: players.think[0],
             of.THINK_OUT: players.think[2],
+        }
+    if kick.candidates is not None:
+        layers |= {
+            of.CANDIDATE: kick.candidates.candidate,
+            of.CANDIDATE_SITUATION: kick.candidates.situation,
+            of.CANDIDATE_TARGET: kick.candidates.target,
+            of.CANDIDATE_BETWEEN: kick.candidates.between,
+            of.CANDIDATE_SCORE: kick.candidates.score,
         }
     yield from ((row, _layer(one)) for row, one in layers.items() if one is not None)
     yield of.INCOME, _array(head.incomes)

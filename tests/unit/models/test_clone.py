@@ -337,8 +337,9 @@ class Exported(torch.nn.Module):
         return logits, parameters
 
 
-def test_the_preset_best_can_be_exported_for_any_batch() -> None:
-    model = Exported(Clone(load_config("best").model).eval())
+@pytest.mark.parametrize("candidates", [0, 8])
+def test_the_preset_best_can_be_exported_for_any_batch(candidates: int) -> None:
+    model = Exported(Clone(load_config("best", [f"model.kick_candidates={candidates}"]).model).eval())
     batch = torch.export.Dim("batch", min=1)
 
     def tensors(n: int) -> tuple[Tensor, ...]:

@@ -64,6 +64,29 @@ TYPICAL_KICK_POWER, TYPICAL_KICK_ANGLE = 5.0, 6 * DEGREE
 TYPICAL_DASH, TYPICAL_TURN, TYPICAL_PLACE = 3.0, 2 * DEGREE, 2.0
 """Scales of components before training."""
 
+LEADS_M, LEAD_ANGLES = (3.0, 8.0), (0.0, 60.0, 120.0, 180.0, -120.0, -60.0)
+"""Metres and degrees, of the pitch, from a team mate at which candidates of passes aim, beside the mate itself."""
+LEADS = 1 + len(LEADS_M) * len(LEAD_ANGLES)
+PASS_ARRIVALS = (1.0, 2.2)
+"""Speeds with which they arrive, metres per cycle."""
+SHOT_YS = (-6.0, -3.0, 0.0, 3.0, 6.0)
+"""Where candidates of shots cross the goal line."""
+CLEARANCES = 12
+"""Directions of hard kicks to nobody."""
+RUN_CYCLES = (3.0, 6.0, 10.0)
+"""Cycles after which the actor has the ball again after a run."""
+CLOSE_SHARES = (0.4, 0.8)
+"""Parts of the kickable area at which the ball is kept."""
+CANDIDATE_DIRECTIONS = 12
+"""Directions of runs, and of where the ball is kept, from the body."""
+PASSES = (N_TEAM - 1) * LEADS * len(PASS_ARRIVALS)
+N_CANDIDATES = PASSES + len(SHOT_YS) + CLEARANCES + (len(RUN_CYCLES) + len(CLOSE_SHARES)) * CANDIDATE_DIRECTIONS + 1
+"""Candidates of a kick, see `candidates`: passes, those to one mate together, then shots and the others."""
+CANDIDATE_COLUMNS = 36
+"""What is known of each."""
+CANDIDATE_REACH = 0.3
+"""Metres per cycle by which an output of 1 changes the velocity of a candidate, along it and across."""
+
 INCOMES = 6
 """Components of dash power that are a learned multiple of what the player recovers in a cycle."""
 FREE_COMPONENTS = 4

@@ -6,19 +6,28 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teamclone.engine.inputs.layout import GEOMETRY, MATES, OTHER, OTHERS
+from teamclone.engine.network.candidates import fill_candidates
 from teamclone.engine.network.constants import (
     AHEAD_M,
     BALL_COMPONENTS,
+    CANDIDATE_COLUMNS,
+    CANDIDATE_REACH,
     DRIBBLES,
     IMPOSSIBLE,
     LEAD_M,
+    LEADS,
     LEAST_ANGLE,
     LEAST_GAIN,
     LEAST_POWER,
     MOST_KICK,
+    N_CANDIDATES,
     N_COMPONENTS,
+    PASS_ARRIVALS,
+    PASSES,
+    SHOT_YS,
     TARGETS,
     TOUCH_M,
     TYPICAL_KICK_ANGLE,
@@ -30,6 +39,12 @@ from teamclone.engine.network.players import PLACES, encode
 from teamclone.engine.network.result import Answer
 from teamclone.engine.network.spec import (
     ATTENTION,
+    CANDIDATE,
+    CANDIDATE_BETWEEN,
+    CANDIDATE_SCORE,
+    CANDIDATE_SITUATION,
+    CANDIDATE_TARGET,
+    CANDIDATES,
     GEOMETRY_AT,
     KICK,
     KICK_DEPTH,
@@ -103,6 +118,9 @@ def _dribbled(cycles: int, ahead: float, aside: float, geometry: Floats) -> tupl
     return x / rolled, y / rolled
 
 
+Places = NDArray[np.float32]
+
+
 class Side(NamedTuple):
     """A situation, or its mirror image, and where its components go.
 
@@ -161,6 +179,49 @@ def _fill_planned(share: Floats, error: Floats, ways: Floats, side: Side, made: 
 
 
 @kernel
+def _fill_candidates(of: Member, others: Floats, seen: tuple[Floats, Places], side: Side, made: Answer) -> None:
+    """Fill the components of candidates.
+
+    Args:
+        others: (OTHERS * len(OTHER),). seen: features of kicks, and the embedding of each place, if there are any.
+    """
+    spec, geometry = of.spec, side.geometry
+    hidden, each = seen
+    width = spec[CANDIDATES]
+    wanted = np.empty(3 * N_CANDIDATES, np.float32)
+    columns = np.empty((N_CANDIDATES, CANDIDATE_COLUMNS), np.float32)
+    fill_candidates(geometry, others, wanted, columns)
+    everywhere, one, two = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    score = np.empty(5, np.float32)
+    of_target = np.zeros((TARGETS, width), np.float32)
+    layer(of, spec[CANDIDATE_SITUATION], hidden, everywhere)
+    if spec[ATTENTION] > 0:
+        for target in range(TARGETS):
+            layer(of, spec[CANDIDATE_TARGET], each[target if target < MATES else OTHERS], of_target[target])
+    first = N_COMPONENTS + _WAYS * spec[PLANNED]
+    for index in range(N_CANDIDATES):
+        at = side.first + first + index
+        layer(of, spec[CANDIDATE], columns[index], one)
+        target = index // (LEADS * len(PASS_ARRIVALS)) if index < PASSES else MATES
+        known = index < PASSES + len(SHOT_YS)
+        for unit in range(width):
+            value = one[unit] + everywhere[unit]
+            if known:
+                value += of_target[target, unit]
+            one[unit] = max(value, np.float32(0.0))
+        layer(of, spec[CANDIDATE_BETWEEN], one, two)
+        layer(of, spec[CANDIDATE_SCORE], two, score)
+        vx, vy = float(wanted[3 * index + 1]), float(wanted[3 * index + 2])
+        speed = math.sqrt(vx * vx + vy * vy + 1e-6)
+        along, across = CANDIDATE_REACH * float(score[1]) / speed, CANDIDATE_REACH * float(score[2]) / speed
+        power, angle = kick_for(vx + along * vx - across * vy, vy + along * vy + across * vx, geometry)
+        side.logits[first + index] = score[0] if wanted[3 * index] > 0 else IMPOSSIBLE
+        made.kick_power.centre[at], made.kick_direction.centre[at] = power, angle * side.mirror
+        made.kick_power.scale[at] = scale_of(float(score[3]), LEAST_POWER, TYPICAL_KICK_POWER)
+        made.kick_direction.scale[at] = scale_of(float(score[4]), LEAST_ANGLE, TYPICAL_KICK_ANGLE)
+
+
+@kernel
 def class_of(degrees: float, count: int) -> int:
     """Return the nearest of ``count`` directions, the first of them straight ahead; 0 for what is no number."""
     return round(degrees * (count / 360.0)) % count if abs(degrees) < 1e9 else 0
@@ -202,6 +263,8 @@ def _fill_side(of: Member, x: Floats, mirror: float, made: Answer) -> None:
             for index in range(6):
                 raw[index * N_COMPONENTS + target] += aim[index]
     components = N_COMPONENTS + _WAYS * spec[PLANNED]
+    if spec[CANDIDATES] > 0:
+        components += N_CANDIDATES
     first = (2 * of.number + (mirror < 0)) * components
     logits, tackle = np.empty(components, np.float32), np.empty(TACKLE_DIRECTIONS, np.float32)
     side = Side(geometry, logits, first, mirror)
@@ -216,6 +279,9 @@ def _fill_side(of: Member, x: Floats, mirror: float, made: Answer) -> None:
         layer(of, spec[TACKLE_TRUST], hidden, trust)
         at = spec[TACKLE_AT]
         tackle[class_of(float(x[at + 1]), TACKLE_DIRECTIONS)] += x[at] * trust[0]
+    if spec[CANDIDATES] > 0:
+        at = spec[OTHERS_AT]
+        _fill_candidates(of, x[at : at + OTHERS * len(OTHER)], (hidden, each), side, made)
     part = 0.5 / spec[MEMBERS]
     softmax(logits, part, made.kick_power.share[first : first + components])
     if mirror < 0:  # class k lies at k steps, its mirror at -k

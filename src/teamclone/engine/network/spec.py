@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from teamclone.engine.inputs.layout import GEOMETRY, OTHER, OTHERS, PARTS, TACKLE
 from teamclone.engine.network.constants import (
     ACTIVATIONS,
+    CANDIDATE_COLUMNS,
     CATCH_DIRECTIONS,
     DASH_DIRECTIONS,
     FREE_COMPONENTS,
     INCOMES,
     MOVE_PLACES,
+    N_CANDIDATES,
     N_COMPONENTS,
     PLAYER_COLUMNS,
     TARGET_COLUMNS,
@@ -41,10 +43,12 @@ Floats = NDArray[np.float32]
  N_ROWS, TARGET_STACK, TARGET_DEPTH, COMMAND_STACK, COMMAND_DEPTH, PARAMETER_STACK, PARAMETER_DEPTH, KICK_STACK,
  KICK_DEPTH, WIDEST, MEAN, STD, SIGNS, LIMITS, CLIP, TEMPERATURE, MEMBER_VALUES, N_VALUES, OUT_LOGITS,
  OUT_PROBABILITIES, OUT_PARAMETERS, OUT_ASKED, OUT_TURN_FACTOR, OUT_DASH, N_DASH, OUT_DASH_DIRECTION, OUT_TURN, N_TURN,
- OUT_KICK, N_KICK, OUT_TACKLE, OUT_CATCH, N_CATCH, OUT_MOVE, N_MOVE, N_OUT, N_SHAPE) = range(60)  # fmt: skip
+ OUT_KICK, N_KICK, OUT_TACKLE, OUT_CATCH, N_CATCH, OUT_MOVE, N_MOVE, N_OUT, CANDIDATES,
+ N_SHAPE) = range(61)  # fmt: skip
 """Fields. INPUTS: how many, of which COLUMNS are normalised. MIXTURE: 1 for a head that answers with distributions, 0
 for one that answers with values. CATCH, MOVE: places of these commands, -1 without. ATTENTION: width of the embedding
-of other players, 0 without. PLANNED: whether kicks have components from plans. GEOMETRY_AT, OTHERS_AT, TACKLE_AT,
+of other players, 0 without. PLANNED: whether kicks have components from plans. CANDIDATES: width of
+the layers that score candidates of kicks, 0 without. GEOMETRY_AT, OTHERS_AT, TACKLE_AT,
 WAYS_AT: where these inputs begin. SEEN_AT, KICKED_AT, PLACED_AT: lists of SEEN, KICKED and PLACED columns, those that
 decide on the command, on a kick, on target points. ARGUMENTS_AT: for each parameter its command, its place in it, and
 whether it is an angle. STACK: place of the row of the first of DEPTH hidden layers. WIDEST: the most inputs or outputs
@@ -57,10 +61,11 @@ WEIGHTS, INS, OUTS, ACTIVATION, ROW_FIELDS = range(5)
 NO_ACTIVATION = -1
 RELU, GELU, SILU, TANH = range(len(ACTIVATIONS))
 
-ROW_NAMES = range(N_SHAPE, N_SHAPE + 27)
+ROW_NAMES = range(N_SHAPE, N_SHAPE + 32)
 (PLACES, COMMAND, PARAMETER, DASH, TURN, INCOME, POWER, CATCH_CLASS, CATCH_EDGES, CATCH_SHARPNESS, MOVE_PLACE,
  OTHER_IN, OTHER_OUT, SITUATION, BEFORE, BETWEEN, AFTER, ASK, HEARD, THINK_IN, THINK_OUT, KICK, KICK_TARGET, WAY_SHARE,
- WAY_ERROR, TACKLE_CLASS, TACKLE_TRUST) = ROW_NAMES  # fmt: skip
+ WAY_ERROR, TACKLE_CLASS, TACKLE_TRUST, CANDIDATE, CANDIDATE_SITUATION, CANDIDATE_TARGET, CANDIDATE_BETWEEN,
+ CANDIDATE_SCORE) = ROW_NAMES  # fmt: skip
 N_NAMED = len(ROW_NAMES)
 N_FIELDS = N_SHAPE + N_NAMED
 """Fields with the places of rows that all networks have; the hidden layers come after these in the table. BEFORE,
@@ -78,6 +83,7 @@ class Shape:
             their widths.
         seen, kicked, placed: the columns that decide on the command, on a kick, on target points.
         target_points: their number. attention: width. planned: see PLANNED.
+        candidates: see CANDIDATES.
         others, ways: whether the inputs end in other players, and in plans.
     """
 
@@ -97,6 +103,7 @@ class Shape:
     kick_hidden: tuple[int, ...] = ()
     attention: int = 0
     planned: bool = False
+    candidates: int = 0
     others: bool = False
     ways: bool = False
 
@@ -144,6 +151,12 @@ def rows_of(shape: Shape) -> list[tuple[int, int, int]]:
         if shape.planned:
             rows[WAY_SHARE], rows[TACKLE_TRUST] = ((at_ball + width, outs, plain) for outs in (len(WAYS), 1))
             rows[WAY_ERROR] = (0, len(WAYS), plain)
+        if scored := shape.candidates:
+            rows[CANDIDATE] = (CANDIDATE_COLUMNS, scored, plain)
+            rows[CANDIDATE_SITUATION] = (at_ball + width, scored, plain)
+            if width:
+                rows[CANDIDATE_TARGET] = (width, scored, plain)
+            rows[CANDIDATE_BETWEEN], rows[CANDIDATE_SCORE] = (scored, scored, relu), (scored, 5, plain)
     activation = ACTIVATIONS.index(shape.activation)
     return [*rows.values()] + [(ins, outs, activation) for stack in shape.stacks for ins, outs in pairwise(stack)]
 
@@ -162,7 +175,7 @@ def spec_of(shape: Shape) -> Ints:
     fields = np.full(N_FIELDS, -1, np.int64)
     fields[[INPUTS, COLUMNS, COMMANDS, PARAMETERS]] = shape.inputs, shape.columns, len(commands), len(parameters)
     fields[[MEMBERS, MIXTURE, TARGET_POINTS, ATTENTION]] = members, shape.mixture, shape.target_points, shape.attention
-    fields[PLANNED] = shape.planned
+    fields[[PLANNED, CANDIDATES]] = shape.planned, shape.candidates
     for field, name in ((CATCH, "catch"), (MOVE, "move")):
         fields[field] = commands.index(name) if name in commands else -1
     tail = shape.columns + len(GEOMETRY)
@@ -203,7 +216,7 @@ def _place_answer(fields: Ints, shape: Shape) -> None:
     """Fill where the parts of an answer stand."""
     n, mixture = shape.members, shape.mixture
     dash, turn = (n * (shape.target_points + more + FREE_COMPONENTS) * mixture for more in (INCOMES, 2))
-    kick = 2 * n * (N_COMPONENTS + len(WAYS) * shape.planned) * mixture
+    kick = 2 * n * (N_COMPONENTS + len(WAYS) * shape.planned + N_CANDIDATES * (shape.candidates > 0)) * mixture
     catch = CATCH_DIRECTIONS * ("catch" in shape.commands) * mixture
     move = n * len(MOVE_PLACES) * ("move" in shape.commands) * mixture
     fields[[N_DASH, N_TURN, N_KICK, N_CATCH, N_MOVE]] = dash, turn, kick, catch, move

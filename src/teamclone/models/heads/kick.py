@@ -30,6 +30,7 @@ from teamclone.engine.network.constants import (
 )
 from teamclone.models import distributions as mixture
 from teamclone.models.distributions import Mixture, scale_of
+from teamclone.models.heads.candidates import Candidates
 from teamclone.models.inputs.geometry import Inputs, geometry_of, mates_of
 from teamclone.planner.columns import WAYS
 from teamclone.rcss import pitch
@@ -76,25 +77,50 @@ class Planned(nn.Module):
             )
 
 
+def _sized(logits: Tensor, wanted: Tensor, scales: Tensor, geometry: Tensor) -> tuple[Mixture, Mixture]:
+    """Return mixtures of power and direction of the kicks that give the ball velocities.
+
+    Args:
+        logits: (batch, components). wanted: (batch, components, 2), see `kick_for`. scales: (batch, components, 2)
+            unbounded, of power and of angle.
+    """
+    with torch.autocast(logits.device.type, enabled=False):
+        power, angle = kick_for(wanted, geometry)
+        return (
+            Mixture(logits, power, scale_of(scales[..., 0], least=LEAST_POWER, typical=TYPICAL_KICK_POWER)),
+            Mixture(logits, angle, scale_of(scales[..., 1], least=LEAST_ANGLE, typical=TYPICAL_KICK_ANGLE)),
+        )
+
+
 class KickMixture(nn.Module):
     """Mixtures of power and direction of a kick; both share the weights of their components.
 
-    There are N_COMPONENTS, and with ``planned`` those of `Planned`.
+    There are N_COMPONENTS, with ``planned`` those of `Planned`, and with ``candidates`` those of `Candidates`.
 
     Args:
         width: of the features of kicks.
         target_width: of the embedding of each of `players.TARGETS`, the team mates and the goal; 0 for none.
         planned: add those of `Planned`, from the ways of the inputs.
+        candidates: width of the layers that score candidates, 0 for none; dropout: of these layers.
     """
 
     goal: Tensor
     cycles: Tensor
 
-    def __init__(self, width: int, target_width: int = 0, *, planned: bool = False) -> None:
+    def __init__(
+        self,
+        width: int,
+        target_width: int = 0,
+        *,
+        planned: bool = False,
+        candidates: int = 0,
+        dropout: float = 0.0,
+    ) -> None:
         super().__init__()
         self.layer = nn.Linear(width, 6 * N_COMPONENTS)
         self.target = nn.Linear(target_width, 6) if target_width else None
         self.planned = Planned(width) if planned else None
+        self.candidates = Candidates(width, target_width, candidates, dropout) if candidates else None
         self.register_buffer("goal", torch.tensor([pitch.HALF_LENGTH, 0.0]), persistent=False)
         self.register_buffer("cycles", torch.tensor(DRIBBLES, dtype=torch.float32), persistent=False)
 
@@ -105,10 +131,15 @@ class KickMixture(nn.Module):
             hidden: (batch, width). inputs: of (batch) situations.
             targets: (batch, TARGETS, target width), None for nothing.
         """
-        free = self._free(hidden, inputs.geometry, targets)
-        if self.planned is None:
-            return free
-        power, angle = (mixture.concatenate(pair) for pair in zip(free, self.planned(hidden, inputs), strict=True))
+        parts = [self._free(hidden, inputs.geometry, targets)]
+        if self.planned is not None:
+            parts.append(self.planned(hidden, inputs))
+        if self.candidates is not None:
+            logits, wanted, scales = self.candidates(hidden, inputs, targets)
+            parts.append(_sized(logits, wanted, scales, inputs.geometry))
+        if len(parts) == 1:
+            return parts[0]
+        power, angle = (mixture.concatenate(part) for part in zip(*parts, strict=True))
         return power, angle
 
     def _free(self, hidden: Tensor, geometry: Tensor, targets: Tensor | None) -> tuple[Mixture, Mixture]:
@@ -127,11 +158,7 @@ class KickMixture(nn.Module):
                 ],
                 1,
             )
-            power, angle = kick_for(wanted, geometry)
-            return (
-                Mixture(logits, power, scale_of(power_scale, least=LEAST_POWER, typical=TYPICAL_KICK_POWER)),
-                Mixture(logits, angle, scale_of(angle_scale, least=LEAST_ANGLE, typical=TYPICAL_KICK_ANGLE)),
-            )
+            return _sized(logits, wanted, torch.stack([power_scale, angle_scale], 2), geometry)
 
     def _aimed(self, ahead: Tensor, aside: Tensor, speed: Tensor, geometry: Tensor) -> Tensor:
         """Return (batch, components, 2) velocities towards a place near a team mate, the goal or the ball."""

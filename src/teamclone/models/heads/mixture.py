@@ -238,8 +238,9 @@ class MixtureHead(nn.Module):
 
     Args:
         width: of what the command is decided on. parameter_width: of what dashes and turns are. kick_width: of what
-            kicks are, target_width: of what is known of each player or goal to kick to. planned: see
-            `heads.kick.KickMixture`. target_points: of `layers.targets.TargetPoints`. commands: the command set.
+            kicks are, target_width: of what is known of each player or goal to kick to. planned, candidates,
+            candidate_dropout: see `heads.kick.KickMixture`. target_points: of `layers.targets.TargetPoints`.
+            commands: the command set.
         parameter_weight: of the parameters' error beside that of the command. target_weight: of the error by which
             turns teach the target points.
 
@@ -259,6 +260,8 @@ class MixtureHead(nn.Module):
         target_width: int,
         planned: bool,
         target_points: int,
+        candidates: int = 0,
+        candidate_dropout: float = 0.0,
         commands: tuple[str, ...] = CLONED,
         parameter_weight: float = 1.0,
         target_weight: float = 0.0,
@@ -270,7 +273,9 @@ class MixtureHead(nn.Module):
         self.command = nn.Linear(width, len(commands))
         self.dash = nn.Linear(parameter_width, 3 * self.n_dash + DASH_DIRECTIONS)
         self.turn = nn.Linear(parameter_width, 3 * self.n_turn)
-        self.kick = KickMixture(kick_width, target_width, planned=planned)
+        self.kick = KickMixture(
+            kick_width, target_width, planned=planned, candidates=candidates, dropout=candidate_dropout
+        )
         self.tackle = nn.Linear(kick_width, TACKLE_DIRECTIONS)
         self.planned_tackle = nn.Linear(kick_width, 1) if planned else None
         self.incomes = nn.Parameter(torch.linspace(0.25, 2.0, INCOMES))

@@ -171,11 +171,11 @@ MODEL = EgocentricConfig(
 )
 
 
-@pytest.fixture(scope="module", params=["plain", "attention"])
+@pytest.fixture(scope="module", params=["plain", "attention", "candidates"])
 def model(request: pytest.FixtureRequest) -> Clone:
     torch.manual_seed(0)
-    attention = 0 if request.param == "plain" else 8
-    model = Clone(replace(MODEL, kick_attention=attention))
+    attention, candidates = {"plain": (0, 0), "attention": (8, 0), "candidates": (8, 4)}[request.param]
+    model = Clone(replace(MODEL, kick_attention=attention, kick_candidates=candidates))
     # Of samples that lean to one side.
     state = situations(100, seed=5)
     model.inputs.fit([model.inputs.project(state.select(state.ball[:, 1] > 0))])

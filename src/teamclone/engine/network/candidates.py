@@ -65,13 +65,15 @@ class Others(NamedTuple):
 
     Attributes:
         x, y: (OTHERS,) metres; far away where there is none. columns: (OTHERS * len(OTHER),) now.
-        line: the offside line, x.
+        line: the offside line, x. rolled: (len(TIMES),) metres that the ball rolls until then,
+            per metre per cycle.
     """
 
     x: Array
     y: Array
     columns: Floats
     line: float
+    rolled: Array
 
 
 class Aim(NamedTuple):
@@ -113,12 +115,11 @@ def nearest(players: Others, first: int, last: int, x: float, y: float) -> float
 @kernel
 def race(players: Others, aim: Aim, geometry: Floats, cycles: float) -> Race:
     """Return who is at the ball after a kick that is where it is to go after so many cycles."""
-    ball_x, ball_y, decay = float(geometry[_BALL_X]), float(geometry[_BALL_Y]), float(geometry[_BALL_DECAY])
+    ball_x, ball_y = float(geometry[_BALL_X]), float(geometry[_BALL_Y])
     cut, theirs, mates = MOST_AHEAD, MOST_AHEAD, MOST_AHEAD
     their_time, mate_time = NEVER_CYCLES, NEVER_CYCLES
     for index in range(len(TIMES)):
-        time = TIMES[index]
-        rolled = roll(time, decay)
+        time, rolled = TIMES[index], players.rolled[index]
         x, y = ball_x + aim.vx * rolled, ball_y + aim.vy * rolled
         late = max(nearest(players, MATES, OTHERS, x, y) - REACH_M, 0.0) / PLAYER_SPEED + REACT_CYCLES - time
         own = max(nearest(players, 0, MATES, x, y) - REACH_M, 0.0) / PLAYER_SPEED + REACT_CYCLES - time
@@ -135,7 +136,11 @@ def race(players: Others, aim: Aim, geometry: Floats, cycles: float) -> Race:
 
 @kernel
 def _put_receiver(players: Others, aim: Aim, cycles: float, columns: Floats) -> None:
-    """Fill what is known of the team mate that a pass goes to."""
+    """Fill what is known of the team mate that a pass goes to, zeros for other kicks.
+
+    Whether it is offside, and the goalkeeper; how far the place is from it; how near an opponent is to it; how late it
+    is at the place.
+    """
     columns[:] = 0
     if aim.mate < 0:
         return
@@ -151,7 +156,14 @@ def _put_receiver(players: Others, aim: Aim, cycles: float, columns: Floats) -> 
 
 @kernel
 def describe(players: Others, aim: Aim, geometry: Floats, columns: Floats) -> None:
-    """Fill (CANDIDATE_COLUMNS,) what is known of a candidate, all of the order of 1."""
+    """Fill (CANDIDATE_COLUMNS,) what is known of a candidate, all of the order of 1.
+
+    The kind, one of KINDS; the ball's speed, the power of the kick and its direction from the body; the place where it
+    goes, its direction on the pitch, how far that is, when and how fast it is there; how late the first opponent is
+    before that, and either side as long as it rolls, and when the team has it; how near either side is to the place,
+    how far the goal, how much nearer than now, and whether it is off the pitch; where the ball is one cycle later, seen
+    from the actor, and how near an opponent is to it; then what `_put_receiver` says.
+    """
     ball_x, ball_y, decay = float(geometry[_BALL_X]), float(geometry[_BALL_Y]), float(geometry[_BALL_DECAY])
     cos, sin = float(geometry[_COS]), float(geometry[_SIN])
     speed = math.sqrt(aim.vx * aim.vx + aim.vy * aim.vy + 1e-6)
@@ -200,7 +212,11 @@ def _others_of(geometry: Floats, others: Floats) -> Others:
         x[player], y[player] = at + of[_VX], float(of[_Y]) + of[_VY]
         if player >= MATES:
             first, second = max(first, at), max(second, min(first, at))
-    return Others(x, y, others, max(second, 0.0, float(geometry[_BALL_X])))
+    rolled = np.empty(len(TIMES))
+    for index in range(len(TIMES)):
+        rolled[index] = roll(TIMES[index], float(geometry[_BALL_DECAY]))
+    line = max(second, 0.0, float(geometry[_BALL_X]))
+    return Others(x, y, others, line, rolled)
 
 
 @kernel
@@ -234,7 +250,8 @@ def _from_body(along: float, turn: int, cycles: float, geometry: Floats) -> tupl
 
 
 @kernel
-def _keep(players: Others, aim: Aim, geometry: Floats, at: int, wanted: Floats, columns: NDArray[np.float32]) -> int:
+def _put(players: Others, aim: Aim, geometry: Floats, at: int, wanted: Floats, columns: NDArray[np.float32]) -> int:
+    """Fill a candidate, and return the place of the next."""
     wanted[3 * at], wanted[3 * at + 1], wanted[3 * at + 2] = 1.0, aim.vx, aim.vy
     describe(players, aim, geometry, columns[at])
     return at + 1
@@ -269,24 +286,24 @@ def fill_candidates(geometry: Floats, others: Floats, wanted: Floats, columns: N
                 x, y = x + far * math.cos(angle), y + far * math.sin(angle)
             for index in range(len(PASS_ARRIVALS)):
                 aim = _towards(PASS, x, y, PASS_ARRIVALS[index], mate, geometry)
-                at = _keep(players, aim, geometry, at, wanted, columns)
+                at = _put(players, aim, geometry, at, wanted, columns)
     for index in range(len(SHOT_YS)):
         aim = _towards(SHOT, _GOAL_X, SHOT_YS[index], top, -1, geometry)
-        at = _keep(players, aim, geometry, at, wanted, columns)
+        at = _put(players, aim, geometry, at, wanted, columns)
     far = top * roll(NEVER_CYCLES, float(geometry[_BALL_DECAY]))
     for index in range(CLEARANCES):
         angle = 2 * math.pi * index / CLEARANCES
         aim = _towards(CLEAR, ball_x + far * math.cos(angle), ball_y + far * math.sin(angle), top, -1, geometry)
-        at = _keep(players, aim, geometry, at, wanted, columns)
+        at = _put(players, aim, geometry, at, wanted, columns)
     decay, dashed = float(geometry[_DECAY]), 100.0 * float(geometry[_DASH_GAIN])
     for index in range(len(RUN_CYCLES)):
         cycles = RUN_CYCLES[index]
         run = dashed / (1.0 - decay) * (cycles - 1.0 - decay * roll(cycles - 1.0, decay))
         for turn in range(CANDIDATE_DIRECTIONS):
             x, y = _from_body(run + AHEAD_M, turn, cycles, geometry)
-            at = _keep(players, _followed(RUN, x, y, cycles, geometry), geometry, at, wanted, columns)
+            at = _put(players, _followed(RUN, x, y, cycles, geometry), geometry, at, wanted, columns)
     for index in range(len(CLOSE_SHARES)):
         for turn in range(CANDIDATE_DIRECTIONS):
             x, y = _from_body(CLOSE_SHARES[index] * float(geometry[_AREA]), turn, 1.0, geometry)
-            at = _keep(players, _followed(CLOSE, x, y, 1.0, geometry), geometry, at, wanted, columns)
-    _keep(players, Aim(CLOSE, 0.0, 0.0, ball_x, ball_y, -1), geometry, at, wanted, columns)
+            at = _put(players, _followed(CLOSE, x, y, 1.0, geometry), geometry, at, wanted, columns)
+    _put(players, Aim(CLOSE, 0.0, 0.0, ball_x, ball_y, -1), geometry, at, wanted, columns)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from typing import Any, cast
 
 import torch
@@ -24,11 +25,14 @@ from teamclone.models.heads.mixture import MixtureHead
 from teamclone.models.heads.point import PointHead
 from teamclone.models.heads.trunk_output import KickFeatures, TrunkOutput
 from teamclone.models.inputs.egocentric import EgocentricFeatures
-from teamclone.models.inputs.paper import Features, PaperFeatures
+from teamclone.models.inputs.paper import Features, Normalisation, PaperFeatures
 from teamclone.models.layers.players import PlayerEncoder
 from teamclone.models.layers.targets import TargetPoints, layers
 from teamclone.models.loss import Balance, Loss, ParameterLoss
 from teamclone.world.state import State, Target
+
+LEAST_KICK_DEVIATION = 0.03
+"""Of an input of kicks, in its deviations among all samples: so that no value is too great in single precision."""
 
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"relu": nn.ReLU, "gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
 
@@ -38,6 +42,10 @@ class EgocentricTrunk(nn.Module):
 
     The layers of dashes and turns see the features of the command, but send no gradient back to them, see
     `MixtureHead`. In the family with a point head there are only target points and the layers of the command.
+
+    Attributes:
+        of_kicks: second normalisation of the inputs of kicks: among all samples the ball is far away, so that those
+            near it hardly differ.
     """
 
     command_columns: Tensor
@@ -64,6 +72,7 @@ class EgocentricTrunk(nn.Module):
             self.parameters_of = layers(
                 (seen + config.hidden[-1], *config.parameter_hidden), activation, config.dropout
             )
+            self.of_kicks = Normalisation(len(self.kick_columns))
             self.kick = layers((len(self.kick_columns), *config.kick_hidden), activation, config.kick_dropout)
             width = config.kick_attention
             self.players = PlayerEncoder(width, config.kick_hidden[-1]) if width else None
@@ -83,11 +92,18 @@ class EgocentricTrunk(nn.Module):
     def at_ball(self, packed: Tensor) -> KickFeatures:
         """Return the features of kicks and tackles; they share no weights with the layers of the command."""
         inputs, targets = self.layout.unpack(torch.cat([packed, packed * self.signs])), None
-        kick = self.kick(inputs.columns.index_select(1, self.kick_columns))
+        kick = self.kick(self.of_kicks(inputs.columns.index_select(1, self.kick_columns)))
         if self.players is not None:
             together, targets = self.players(kick, inputs)
             kick = torch.cat([kick, together], 1)
         return KickFeatures(kick, inputs, targets)
+
+    def fit_kicks(self, chunks: Iterable[Tensor]) -> None:
+        """Fit ``of_kicks`` to normalised inputs of kicks and tackles, chunk by chunk."""
+        self.of_kicks.fit(chunk.index_select(1, self.kick_columns) for chunk in chunks)
+        # Columns that change their sign in the mirror must do so after normalisation, too.
+        self.of_kicks.mean[self.signs[self.kick_columns] < 0] = 0.0
+        self.of_kicks.std.clamp_(min=LEAST_KICK_DEVIATION)
 
 
 class Trunks(nn.Module):
@@ -148,6 +164,26 @@ class Clone(nn.Module):
     def inputs(self) -> Features:
         """The inputs of the model, with their normalisation."""
         return cast(Features, self.features)
+
+    def fit(self, chunks: Iterable[Tensor], of_kicks: Iterable[Tensor] = ()) -> None:
+        """Fit the normalisation to projected training samples, chunk by chunk, (n, columns) each.
+
+        Args:
+            of_kicks: those of kicks and tackles alone, which families with an answer to them need; nothing is fitted to
+                nothing.
+        """
+        self.inputs.fit(chunks)
+        if not isinstance(self.config, EgocentricConfig):
+            return
+        given = iter(of_kicks)
+        some = next(given, None)
+        if some is None:
+            return
+        members = self.trunk.members if isinstance(self.trunk, Trunks) else [self.trunk]
+        first, *others = (cast(EgocentricTrunk, member) for member in members)
+        first.fit_kicks(self.inputs.normalise(chunk) for chunk in chain([some], given))
+        for other in others:
+            other.of_kicks.load_state_dict(first.of_kicks.state_dict())
 
     def answer(self, state: State, *, kick_rows: Tensor | None = None) -> Answer:
         """Return the answer to a state; ``kick_rows`` as in `answer_inputs`."""

@@ -22,7 +22,7 @@ from teamclone.models.heads.ensemble import EnsembleHead
 from teamclone.models.heads.mixture import MixtureHead
 from teamclone.models.heads.point import PointHead
 from teamclone.models.inputs.egocentric import CLIP, EgocentricFeatures
-from teamclone.models.inputs.paper import PaperFeatures
+from teamclone.models.inputs.paper import Normalisation, PaperFeatures
 from teamclone.planner.kick_sequences import DEFAULT_RULES, kick_order
 from teamclone.rcss.commands import parameters_of
 
@@ -131,7 +131,10 @@ def _rows(spec: Ints, trunk: nn.Module, head: nn.Module) -> Iterator[tuple[int, 
             yield spec[of.PLACES], _layer(trunk.targets.place)
     linear = [one for stack in stacks for one in stack.modules() if isinstance(one, nn.Linear)]
     first = spec[of.ROWS_AT] + of.ROW_FIELDS * len(of.ROW_NAMES)
-    yield from ((first + of.ROW_FIELDS * index, _layer(one)) for index, one in enumerate(linear))
+    at_ball = next(trunk.kick.children()) if isinstance(trunk, EgocentricTrunk) and trunk.answers else None
+    for index, one in enumerate(linear):
+        of_kicks = cast(EgocentricTrunk, trunk).of_kicks if one is at_ball else None
+        yield first + of.ROW_FIELDS * index, _layer(one) if of_kicks is None else _normalised(one, of_kicks)
     if isinstance(head, PointHead):
         yield spec[of.COMMAND], _layer(head.command)
         yield spec[of.PARAMETER], _layer(head.parameter)
@@ -190,6 +193,13 @@ def _layer(module: nn.Module) -> NDArray[np.float32]:
     weight, bias = cast(Tensor, module.weight), cast(Tensor, module.bias)
     weight = weight.mT if weight.dim() > 1 else weight
     return np.concatenate([_array(weight), _array(bias)])
+
+
+def _normalised(layer: nn.Linear, inputs: Normalisation) -> NDArray[np.float32]:
+    """Weights and biases as of `_layer`, of a layer after a normalisation, which they contain."""
+    weight, bias = layer.weight.detach().double(), layer.bias.detach().double()
+    scaled = weight / inputs.std.double()
+    return np.concatenate([_array(scaled.mT), _array(bias - scaled @ inputs.mean.double())])
 
 
 def _array(tensor: Tensor) -> NDArray[np.float32]:

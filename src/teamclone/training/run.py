@@ -40,7 +40,7 @@ from teamclone.training.checkpoint import load_weights, save_weights
 from teamclone.training.config import Config, config_from, to_toml
 from teamclone.training.line_up import line_up_of, save_line_up
 
-FORMAT = 4
+FORMAT = 5
 """Raised whenever a reader of the old folder would misread the new one."""
 
 RESUME = "resume"

@@ -16,6 +16,7 @@ from teamclone.dataset.layout import Split
 from teamclone.dataset.reader import Dataset
 from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.models.clone import Clone
+from teamclone.models.heads.mixture import WITH_BALL
 from teamclone.models.loss import Balance
 from teamclone.training.batches import Batches
 from teamclone.training.checkpoint import load_progress, load_weights
@@ -111,6 +112,7 @@ def prepare(
         mirrored=rows if config.data.mirror else None,
         on_progress=on_progress,
     )
+    kinds = dataset.samples["kind"].numpy()[rows]
     done = 0
     if run.checkpoint_path(RESUME).is_file():
         done = load_progress(run.checkpoint_path(RESUME), model, optimiser)
@@ -118,9 +120,8 @@ def prepare(
         load_weights(run.checkpoint_path(BASE), model)
         model.head.temperature.fill_(1.0)  # that of the base suits other teams
     else:
-        model.inputs.fit(batches.columns(rows[:: max(1, len(rows) // FIT_ROWS)]))
+        _fit(model, batches, rows, kinds)
     group.share_weights(model)
-    kinds = dataset.samples["kind"].numpy()[rows]
     draws, balance = balanced(config.train, np.bincount(kinds, minlength=len(dataset.commands)), device)
     return Setup(
         run=run,
@@ -174,6 +175,12 @@ def _check_resumable(config: Config, dataset: Dataset, run: Run) -> None:
     changed = [text for text in differences(run.config, config) if text.partition(":")[0] not in free]
     if changed:
         raise RunError(f"{run.path}: cannot resume with other settings ({'; '.join(changed)}); begin a new run")
+
+
+def _fit(model: Clone, batches: Batches, rows: NDArray[np.int64], kinds: NDArray[np.uint8]) -> None:
+    """Fit the normalisation to the training samples of these commands."""
+    every = batches.columns(rows[:: max(1, len(rows) // FIT_ROWS)])
+    model.fit(every, batches.columns(rows[np.isin(kinds, WITH_BALL)]))
 
 
 def _resources(config: TrainConfig) -> tuple[torch.device, Literal["fp32", "bf16"]]:

@@ -11,7 +11,7 @@ from torch import Tensor
 from teamclone.engine.inputs.layout import BLOCKS
 from teamclone.engine.network.constants import ACTIVATIONS
 from teamclone.models.answer import Answer
-from teamclone.models.clone import Clone, parameter_count
+from teamclone.models.clone import LEAST_KICK_DEVIATION, Clone, EgocentricTrunk, Trunks, parameter_count
 from teamclone.models.config import EgocentricConfig, EgocentricPointConfig, ModelConfig, PaperConfig
 from teamclone.models.heads.mixture import with_ball
 from teamclone.models.loss import Balance, Loss
@@ -351,3 +351,30 @@ def test_the_preset_best_can_be_exported_for_any_batch(candidates: int) -> None:
         for one, other in zip(exported(*tensors(n)), model(*tensors(n)), strict=True):
             assert one.shape[0] == n
             assert torch.allclose(one, other, atol=1e-2)
+
+
+@pytest.mark.parametrize("members", [1, 2])
+def test_inputs_of_kicks_are_normalised_among_kicks(members: int) -> None:
+    """Where the others have the ball far away, inputs near it would hardly differ."""
+    model = Clone(replace(RELATIVE, ensemble_size=members))
+    every = model.inputs.project(situations(200, seed=1))
+    model.fit([every], [every[:30], every[30:50]])
+    trunks = model.trunk.members if isinstance(model.trunk, Trunks) else [model.trunk]
+    assert len(trunks) == members
+    for trunk in trunks:
+        assert isinstance(trunk, EgocentricTrunk)
+        columns = trunk.of_kicks(model.inputs.normalise(every[:50]).index_select(1, trunk.kick_columns))
+        plain = trunk.signs[trunk.kick_columns] > 0
+        told_apart = plain & (trunk.of_kicks.std > LEAST_KICK_DEVIATION) & (columns.std(0) > 0)
+        assert told_apart.sum() > 20
+        assert columns[:, told_apart].mean(0).abs().max() < 1e-4
+        assert (columns[:, told_apart].std(0, correction=0) - 1).abs().max() < 1e-4
+        # What changes its sign in the mirror is not shifted.
+        assert (trunk.of_kicks.mean[~plain] == 0).all()
+
+
+def test_without_kicks_their_inputs_stay_as_they_are() -> None:
+    model = Clone(RELATIVE)
+    model.fit([model.inputs.project(situations(20, seed=1))])
+    assert isinstance(model.trunk, EgocentricTrunk)
+    assert (model.trunk.of_kicks.std == 1).all()

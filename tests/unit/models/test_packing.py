@@ -11,8 +11,9 @@ from tests.unit.engine.network.test_answer import FULL, MODELS, varied
 
 from teamclone.engine.network import spec as of
 from teamclone.errors import RunError
-from teamclone.models.clone import parameter_count
+from teamclone.models.clone import EgocentricTrunk, parameter_count
 from teamclone.models.config import ModelConfig
+from teamclone.models.inputs.paper import Normalisation
 from teamclone.models.packing import pack
 
 
@@ -22,6 +23,9 @@ def test_every_weight_has_a_place_of_its_own(config: ModelConfig) -> None:
     with torch.no_grad():
         for index, weights in enumerate(model.parameters()):
             weights.fill_(index + 1)
+    for module in model.modules():
+        if isinstance(module, EgocentricTrunk) and module.answers:
+            module.of_kicks = Normalisation(len(module.kick_columns))  # which changes nothing
     weights = pack(model)
     members = weights.values[weights.spec[of.N_VALUES] - config.ensemble_size * weights.spec[of.MEMBER_VALUES] :]
     assert len(members) == parameter_count(model)

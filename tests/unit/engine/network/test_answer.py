@@ -86,7 +86,8 @@ def varied(config: ModelConfig, *, seed: int = 0) -> Clone:
         for weights in model.parameters():
             weights.add_(0.1 * torch.randn_like(weights))
         model.head.temperature.fill_(1.3)
-    model.inputs.fit([model.inputs.project(situations(300, history=model.inputs.history))])
+    every = model.inputs.project(situations(300, history=model.inputs.history))
+    model.fit([every], [every[::3], every[1::3]])
     return model
 
 

@@ -232,6 +232,7 @@ CHANGES: dict[str, tuple[str, Sequence[str]]] = {
     "model.parameter_hidden": ("relative", ["model.parameter_hidden=9"]),
     "model.kick_hidden": ("relative", ["model.kick_hidden=9"]),
     "model.kick_attention": ("relative", ["model.kick_attention=4"]),
+    "model.kick_candidates": ("relative", ["model.kick_candidates=4"]),
     "model.kick_dropout": ("relative", ["model.kick_dropout=0.5"]),
     "model.hidden": ("paper", ["model.hidden=[17]"]),
     "model.activation": ("paper", ["model.activation=tanh"]),

@@ -15,7 +15,7 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import open_dataset
 from teamclone.engine.inputs.layout import BLOCKS
-from teamclone.engine.network.constants import ACTIVATIONS
+from teamclone.engine.network.constants import ACTIVATIONS, MEDOID_COMPONENTS
 from teamclone.engine.network.network import Network
 from teamclone.engine.network.result import Mixture
 from teamclone.models import distributions
@@ -146,7 +146,10 @@ def assert_alike(made: dict[str, Values], expected: dict[str, Values], rows: sli
 
 
 def cost(made: dict[str, Values], name: str, values: Values) -> Values:
-    """(n,) the expected distance of values to a parameter, in its range: what its median makes least."""
+    """(n,) the expected distance of values to a parameter, in its range: what its median makes least.
+
+    A median is that of the components with the greatest shares.
+    """
     limit = RANGE[name]
     centre = made[f"{name}.centre"]
     if name.endswith("power"):
@@ -154,7 +157,11 @@ def cost(made: dict[str, Values], name: str, values: Values) -> Values:
     away = np.abs(centre - values[:, None])
     if limit == math.pi:
         away = np.minimum(away, 2 * math.pi - away)
-    result: Values = (made[f"{name}.share"] * away).sum(1) / limit
+    share = made[f"{name}.share"]
+    if share.shape[1] > MEDOID_COMPONENTS:
+        main = np.argsort(-share, axis=1, kind="stable")[:, :MEDOID_COMPONENTS]
+        share, away = np.take_along_axis(share, main, 1), np.take_along_axis(away, main, 1)
+    result: Values = (share * away).sum(1) / limit
     return result
 
 

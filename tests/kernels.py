@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from planned import plans_of
 from situations import situations
@@ -33,12 +34,16 @@ def compile_network_and_readers() -> None:
     from teamclone.logs import read_match
     from teamclone.models.clone import Clone
     from teamclone.models.config import PaperConfig
+    from teamclone.models.heads.candidates import candidates_of
+    from teamclone.models.inputs.geometry import InputLayout
     from teamclone.models.packing import pack
 
     model = Clone(PaperConfig(hidden=(4,)))
     network = Network(pack(model))
     answers = network.answers(model.inputs.project(situations(3)).numpy())
     network.samples(answers, np.zeros((3, UNIFORMS)))
+    layout = InputLayout(columns=0, others=True, plan=False)
+    candidates_of(layout.unpack(torch.zeros(1, len(layout.tail))))
     for path in (FIXTURES / "v6").glob("*.rcg.gz"):
         read_match(path)
 

@@ -25,6 +25,7 @@ from teamclone.engine.network.constants import (
     LEAST_GAIN,
     NEVER_CYCLES,
     PASS_ARRIVALS,
+    PASSES_TO_EACH,
     RUN_CYCLES,
     SHOT_YS,
 )
@@ -238,15 +239,27 @@ def _followed(kind: int, x: float, y: float, cycles: float, geometry: Floats) ->
 
 
 @kernel
-def _from_body(along: float, turn: int, cycles: float, geometry: Floats) -> tuple[float, float]:
-    """Return a place some metres from where the actor coasts, in one of the directions around its body."""
+def run_m(cycles: float, geometry: Floats) -> float:
+    """Return the metres that full dashes from the second cycle on carry the actor further than it coasts."""
+    decay = float(geometry[_DECAY])
+    return 100.0 * float(geometry[_DASH_GAIN]) / (1.0 - decay) * ((cycles - 1) - decay * roll(cycles - 1, decay))
+
+
+@kernel
+def beside_actor(ahead: float, aside: float, cycles: float, geometry: Floats) -> tuple[float, float]:
+    """Return the place so many metres ahead, and to the right, of where the actor coasts in some cycles."""
     cos, sin = float(geometry[_COS]), float(geometry[_SIN])
     coasted = roll(cycles, float(geometry[_DECAY]))
-    angle = 2 * math.pi * turn / CANDIDATE_DIRECTIONS
-    ahead = float(geometry[_FORWARD]) * coasted + along * math.cos(angle)
-    aside = float(geometry[_ASIDE]) * coasted + along * math.sin(angle)
+    along, across = float(geometry[_FORWARD]) * coasted + ahead, float(geometry[_ASIDE]) * coasted + aside
     x, y = float(geometry[_ME_X]), float(geometry[_ME_Y])
-    return x + ahead * cos - aside * sin, y + ahead * sin + aside * cos
+    return x + along * cos - across * sin, y + along * sin + across * cos
+
+
+@kernel
+def _around_actor(metres: float, turn: int, cycles: float, geometry: Floats) -> tuple[float, float]:
+    """Return a place some metres from where the actor coasts, in one of the directions around its body."""
+    angle = 2 * math.pi * turn / CANDIDATE_DIRECTIONS
+    return beside_actor(metres * math.cos(angle), metres * math.sin(angle), cycles, geometry)
 
 
 @kernel
@@ -273,8 +286,8 @@ def fill_candidates(geometry: Floats, others: Floats, wanted: Floats, columns: N
     at = 0
     for mate in range(MATES):
         if not others[mate * _WIDTH + _THERE] > 0:
-            columns[at : at + LEADS * len(PASS_ARRIVALS)] = 0
-            at += LEADS * len(PASS_ARRIVALS)
+            columns[at : at + PASSES_TO_EACH] = 0
+            at += PASSES_TO_EACH
             continue
         for lead in range(LEADS):
             x, y = players.x[mate], players.y[mate]
@@ -295,15 +308,14 @@ def fill_candidates(geometry: Floats, others: Floats, wanted: Floats, columns: N
         angle = 2 * math.pi * index / CLEARANCES
         aim = _towards(CLEAR, ball_x + far * math.cos(angle), ball_y + far * math.sin(angle), top, -1, geometry)
         at = _put(players, aim, geometry, at, wanted, columns)
-    decay, dashed = float(geometry[_DECAY]), 100.0 * float(geometry[_DASH_GAIN])
     for index in range(len(RUN_CYCLES)):
         cycles = RUN_CYCLES[index]
-        run = dashed / (1.0 - decay) * (cycles - 1.0 - decay * roll(cycles - 1.0, decay))
+        run = run_m(cycles, geometry)
         for turn in range(CANDIDATE_DIRECTIONS):
-            x, y = _from_body(run + AHEAD_M, turn, cycles, geometry)
+            x, y = _around_actor(run + AHEAD_M, turn, cycles, geometry)
             at = _put(players, _followed(RUN, x, y, cycles, geometry), geometry, at, wanted, columns)
     for index in range(len(CLOSE_SHARES)):
         for turn in range(CANDIDATE_DIRECTIONS):
-            x, y = _from_body(CLOSE_SHARES[index] * float(geometry[_AREA]), turn, 1.0, geometry)
+            x, y = _around_actor(CLOSE_SHARES[index] * float(geometry[_AREA]), turn, 1.0, geometry)
             at = _put(players, _followed(CLOSE, x, y, 1.0, geometry), geometry, at, wanted, columns)
     _put(players, Aim(CLOSE, 0.0, 0.0, ball_x, ball_y, -1), geometry, at, wanted, columns)

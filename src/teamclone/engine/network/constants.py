@@ -79,7 +79,8 @@ CLOSE_SHARES = (0.4, 0.8)
 """Parts of the kickable area at which the ball is kept."""
 CANDIDATE_DIRECTIONS = 12
 """Directions of runs, and of where the ball is kept, from the body."""
-PASSES = (N_TEAM - 1) * LEADS * len(PASS_ARRIVALS)
+PASSES_TO_EACH = LEADS * len(PASS_ARRIVALS)
+PASSES = (N_TEAM - 1) * PASSES_TO_EACH
 N_CANDIDATES = PASSES + len(SHOT_YS) + CLEARANCES + (len(RUN_CYCLES) + len(CLOSE_SHARES)) * CANDIDATE_DIRECTIONS + 1
 """Candidates of a kick, see `candidates`: passes, those to one mate together, then shots and the others."""
 CANDIDATE_COLUMNS = 36

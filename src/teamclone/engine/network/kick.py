@@ -6,10 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teamclone.engine.inputs.layout import GEOMETRY, MATES, OTHER, OTHERS
-from teamclone.engine.network.candidates import fill_candidates
+from teamclone.engine.network.candidates import beside_actor, fill_candidates, run_m
 from teamclone.engine.network.constants import (
     AHEAD_M,
     BALL_COMPONENTS,
@@ -18,15 +17,14 @@ from teamclone.engine.network.constants import (
     DRIBBLES,
     IMPOSSIBLE,
     LEAD_M,
-    LEADS,
     LEAST_ANGLE,
     LEAST_GAIN,
     LEAST_POWER,
     MOST_KICK,
     N_CANDIDATES,
     N_COMPONENTS,
-    PASS_ARRIVALS,
     PASSES,
+    PASSES_TO_EACH,
     SHOT_YS,
     TARGETS,
     TOUCH_M,
@@ -53,6 +51,7 @@ from teamclone.engine.network.spec import (
     KICKED,
     KICKED_AT,
     MEMBERS,
+    N_KICK,
     OTHERS_AT,
     PLANNED,
     SIGNS,
@@ -70,11 +69,10 @@ from teamclone.planner.tackle import DIRECTIONS as TACKLE_DIRECTIONS
 from teamclone.rcss import pitch
 from teamclone.system.compiling import kernel
 
-(_X, _Y, _COS, _SIN, _FORWARD, _ASIDE, _DECAY, _DASH_GAIN, _BALL_X, _BALL_Y, _BALL_VX, _BALL_VY, _GAIN, _BALL_DECAY,
- _SPEED_MAX, _MATE) = (
+(_COS, _SIN, _BALL_X, _BALL_Y, _BALL_VX, _BALL_VY, _GAIN, _BALL_DECAY, _SPEED_MAX, _MATE) = (
     GEOMETRY.index(name) for name in (
-        "x", "y", "cos", "sin", "forward", "aside", "decay", "dash_gain", "ball_x", "ball_y", "ball_vx", "ball_vy",
-        "kick_gain", "ball_decay", "ball_speed_max", "mate_0_x"))  # fmt: skip
+        "cos", "sin", "ball_x", "ball_y", "ball_vx", "ball_vy", "kick_gain", "ball_decay", "ball_speed_max",
+        "mate_0_x"))  # fmt: skip
 _AIMED = TARGETS + BALL_COMPONENTS
 """Components that aim at a place; the others are dribbles."""
 _GOAL_X = pitch.HALF_LENGTH
@@ -107,18 +105,10 @@ def _aimed(index: int, ahead: float, aside: float, speed: float, geometry: Float
 @kernel
 def _dribbled(cycles: int, ahead: float, aside: float, geometry: Floats) -> tuple[float, float]:
     """Return the velocity of a dribble: after a kick and dashes straight on the ball is in front of the actor."""
-    decay, cos, sin = float(geometry[_DECAY]), float(geometry[_COS]), float(geometry[_SIN])
-    coasted = roll(cycles, decay)
-    run = 100.0 * float(geometry[_DASH_GAIN]) / (1.0 - decay) * ((cycles - 1) - decay * roll(cycles - 1, decay))
-    along = float(geometry[_FORWARD]) * coasted + run + AHEAD_M + TOUCH_M * ahead
-    across = float(geometry[_ASIDE]) * coasted + TOUCH_M * aside
-    x = float(geometry[_X]) + along * cos - across * sin - float(geometry[_BALL_X])
-    y = float(geometry[_Y]) + along * sin + across * cos - float(geometry[_BALL_Y])
+    ahead, aside = run_m(cycles, geometry) + AHEAD_M + TOUCH_M * ahead, TOUCH_M * aside
+    x, y = beside_actor(ahead, aside, cycles, geometry)
     rolled = roll(cycles, float(geometry[_BALL_DECAY]))
-    return x / rolled, y / rolled
-
-
-Places = NDArray[np.float32]
+    return (x - float(geometry[_BALL_X])) / rolled, (y - float(geometry[_BALL_Y])) / rolled
 
 
 class Side(NamedTuple):
@@ -179,7 +169,7 @@ def _fill_planned(share: Floats, error: Floats, ways: Floats, side: Side, made: 
 
 
 @kernel
-def _fill_candidates(of: Member, others: Floats, seen: tuple[Floats, Places], side: Side, made: Answer) -> None:
+def _fill_candidates(of: Member, others: Floats, seen: tuple[Floats, Floats], side: Side, made: Answer) -> None:
     """Fill the components of candidates.
 
     Args:
@@ -202,7 +192,7 @@ def _fill_candidates(of: Member, others: Floats, seen: tuple[Floats, Places], si
     for index in range(N_CANDIDATES):
         at = side.first + first + index
         layer(of, spec[CANDIDATE], columns[index], one)
-        target = index // (LEADS * len(PASS_ARRIVALS)) if index < PASSES else MATES
+        target = index // PASSES_TO_EACH if index < PASSES else MATES
         known = index < PASSES + len(SHOT_YS)
         for unit in range(width):
             value = one[unit] + everywhere[unit]
@@ -262,9 +252,7 @@ def _fill_side(of: Member, x: Floats, mirror: float, made: Answer) -> None:
             layer(of, spec[KICK_TARGET], each[target if target < MATES else OTHERS], aim)
             for index in range(6):
                 raw[index * N_COMPONENTS + target] += aim[index]
-    components = N_COMPONENTS + _WAYS * spec[PLANNED]
-    if spec[CANDIDATES] > 0:
-        components += N_CANDIDATES
+    components = spec[N_KICK] // (2 * spec[MEMBERS])
     first = (2 * of.number + (mirror < 0)) * components
     logits, tackle = np.empty(components, np.float32), np.empty(TACKLE_DIRECTIONS, np.float32)
     side = Side(geometry, logits, first, mirror)

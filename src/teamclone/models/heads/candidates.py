@@ -18,9 +18,8 @@ from teamclone.engine.network.constants import (
     CANDIDATE_COLUMNS,
     CANDIDATE_REACH,
     IMPOSSIBLE,
-    LEADS,
     N_CANDIDATES,
-    PASS_ARRIVALS,
+    PASSES_TO_EACH,
     SHOT_YS,
 )
 from teamclone.models.inputs.geometry import Inputs
@@ -78,14 +77,13 @@ class Candidates(nn.Module):
             (batch, N_CANDIDATES), (batch, N_CANDIDATES, 2) metres per cycle, and (batch, N_CANDIDATES, 2) of power and
             angle.
         """
-        with torch.autocast(hidden.device.type, enabled=False):
-            wanted, columns = candidates_of(inputs)
+        wanted, columns = candidates_of(inputs)
         each = self.candidate(columns) + self.situation(hidden)[:, None]
         if self.target is not None and targets is not None:
             known = self.target(targets)
             known = torch.cat(
                 [
-                    known[:, :-1].repeat_interleave(LEADS * len(PASS_ARRIVALS), 1),
+                    known[:, :-1].repeat_interleave(PASSES_TO_EACH, 1),
                     known[:, -1:].expand(-1, len(SHOT_YS), -1),
                 ],
                 1,

@@ -17,10 +17,10 @@ from teamclone.engine.network.constants import (
     CANDIDATE_DIRECTIONS,
     CLEARANCES,
     CLOSE_SHARES,
-    LEADS,
     N_CANDIDATES,
     PASS_ARRIVALS,
     PASSES,
+    PASSES_TO_EACH,
     RUN_CYCLES,
     SHOT_YS,
 )
@@ -82,7 +82,7 @@ def test_they_are_in_their_order() -> None:
 
 def test_there_is_no_pass_to_who_is_not_there() -> None:
     candidates = made({2: {"x": 20.0, "y": 3.0}})
-    first, last = 2 * LEADS * len(PASS_ARRIVALS), 3 * LEADS * len(PASS_ARRIVALS)
+    first, last = 2 * PASSES_TO_EACH, 3 * PASSES_TO_EACH
     assert candidates.there[:PASSES].nonzero()[0].tolist() == list(range(first, last))
     assert candidates.there[PASSES:].all()
 

@@ -8,11 +8,12 @@ COPIES ?= 1
 TEAM ?= HELIOS_base
 KILLS ?= 50
 FIDELITY := .fidelity
+PANEL := .panel
 OPTIONS ?=
 MINUTES ?= 30
 DEMO := demo
 
-.PHONY: help install browser demo test docs notebook lint format bench fidelity faults fuzz clean
+.PHONY: help install browser demo test docs notebook lint format bench fidelity ablations faults fuzz clean
 
 help:
 	@echo "make demo     train, replay and report a clone of HELIOS_base on the bundled matches"
@@ -21,7 +22,8 @@ help:
 	@echo "make notebook run docs/notebook.ipynb anew"
 	@echo "make lint     ruff and mypy"
 	@echo "make bench    speed, as ratios (MATCHES=folder of logs, TEAM=name, COPIES='1 3 39' of each match)"
-	@echo "make fidelity how good clones are, and docs/explanation/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
+	@echo "make fidelity how good clones of a panel of teams are, and docs/explanation/panel.md from it (MATCHES=folder)"
+	@echo "make ablations what makes clones good, and docs/explanation/fidelity.md from it (MATCHES=folder, OPTIONS='--only c,b')"
 	@echo "make faults   kill ingest, dataset and train KILLS times each and resume (default 50)"
 	@echo "make fuzz     fuzz every log reader for MINUTES (default 30), then their time and memory for as long"
 	@echo "make install  only set up $(VENV)"
@@ -90,6 +92,9 @@ bench: install
 	$(BIN)/python benchmarks/scout.py $(MATCHES) --team $(TEAM) --counts 3
 
 fidelity: install
+	$(BIN)/python benchmarks/panel.py $(MATCHES) --out $(PANEL) --page docs/explanation/panel.md $(OPTIONS)
+
+ablations: install
 	$(BIN)/python benchmarks/fidelity.py $(MATCHES) --out $(FIDELITY) --page docs/explanation/fidelity.md --team $(TEAM) $(OPTIONS)
 
 faults: install

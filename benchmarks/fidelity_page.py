@@ -158,7 +158,7 @@ def _head(results: Results) -> str:
 
 How well clones of HELIOS_base predict the team, compared with the goals of the project; what each part of the preset
 `best` contributes; and which errors remain. Both teams played with the full state; [what the figures
-mean](figures.md#full-state) says what changes without it. `make fidelity MATCHES=folder` runs everything and writes
+mean](figures.md#full-state) says what changes without it. `make ablations MATCHES=folder` runs everything and writes
 this
 page; no result on it is typed by hand."""
     if not results:
@@ -552,7 +552,7 @@ Errors by situation. To find the first player at the ball, the ball is assumed t
 
 
 def _reproduce(results: Results, commands: Sequence[str]) -> str:
-    text = "## Reproduce\n\n```sh\nmake fidelity MATCHES=folder\n```"
+    text = "## Reproduce\n\n```sh\nmake ablations MATCHES=folder\n```"
     if commands:
         listing = "\n".join(commands)
         text += "\n\nruns these commands, and the measurements between them, with the logs in `MATCHES`:"

@@ -19,7 +19,7 @@ from typing import Any
 
 from fidelity import TEST_MATCHES
 from fidelity_page import filled, machines, table
-from measure import cost_of
+from measure import Commands, cost_of
 
 from teamclone.system.documents import write_document
 from teamclone.system.files import write_atomic
@@ -42,24 +42,14 @@ class Work:
     def __init__(self, options: argparse.Namespace) -> None:
         self.options, self.out = options, Path(options.out)
         self.held_out = [part for match in options.test_match for part in ("--test-match", match)]
-        self.commands: list[str] = []
-
-    def teamclone(self, *arguments: object, made: Path) -> float | None:
-        """Run a command whose product is not there; its seconds, None where it is."""
-        command = [*map(str, arguments)]
-        text = " ".join(("teamclone", *command)).replace(str(self.options.matches), "MATCHES")
-        self.commands.append(text.replace(str(self.out), "DIR"))
-        if made.exists():
-            return None
-        print(f"{made} ...", file=sys.stderr, flush=True)
-        return cost_of(sys.executable, "-m", "teamclone", *command).wall
+        self.commands = Commands({options.matches: "MATCHES", self.out: "DIR"})
 
     def clone(self, name: str, teams: Sequence[str]) -> dict[str, Any]:
         """Dataset, clone and figures of some teams."""
         data, run = self.out / "datasets" / name, self.out / "runs" / name
         ended = self.out / "runs" / f"{name}.json"
         held_out = self.held_out if name == "base" else []
-        self.teamclone(
+        self.commands.run(
             *("dataset", "--store", self.out / "store", *(part for team in teams for part in ("--team", team))),
             *("--commands", "received", "--train-goalkeepers", *held_out, "--out", data),
             made=data,
@@ -67,10 +57,10 @@ class Work:
         settings = [part for setting in self.options.set for part in ("--set", setting)]
         if not ended.is_file():
             shutil.rmtree(run, ignore_errors=True)
-        seconds = self.teamclone("train", data, "--preset", "best", *settings, "--out", run, made=ended)
+        seconds = self.commands.run("train", data, "--preset", "best", *settings, "--out", run, made=ended)
         if seconds is not None:
             write_document(ended, {"seconds": seconds})
-        self.teamclone("evaluate", run, made=run / "evaluation.json")
+        self.commands.run("evaluate", run, made=run / "evaluation.json")
         figures = json.loads((run / "evaluation.json").read_text(encoding="utf-8"))["splits"]["test"]
         matches = json.loads((data / "dataset.json").read_text(encoding="utf-8"))["matches"]
         return {
@@ -91,7 +81,7 @@ class Work:
             *("--matches", *map(str, COUNTS)),
         ]
         text = " ".join(("python benchmarks/adapting.py", *command[1:]))
-        self.commands.append(text.replace(str(self.out), "DIR"))
+        self.commands.shown.append(text.replace(str(self.out), "DIR"))
         if not path.is_file():
             print(f"{path} ...", file=sys.stderr, flush=True)
             with path.with_suffix(".part").open("wb") as file:
@@ -150,7 +140,7 @@ same form that goes through as many batches, on {adapted["environment"]["threads
 {len(adapted["matches"])} matches of {adapted["rows"]:,} commands. {seen}""",
         table(("training matches", "samples", "adapted, s", *OF_TWO, "fresh, s", *OF_TWO), rows),
         "## Reproduce",
-        "```\n" + "\n".join(work.commands) + "\n```",
+        "```\n" + "\n".join(work.commands.shown) + "\n```",
         machines([*(clone["machine"] for clone in clones.values()), adapted["environment"]]),
     ]
     return "\n\n".join(filled(part) for part in parts)
@@ -176,7 +166,7 @@ def main() -> None:
     options = parser.parse_args()
     load_config("best", options.set)  # a wrong setting is reported before the work
     work = Work(options)
-    work.teamclone("ingest", options.matches, "--store", work.out / "store", made=work.out / "store")
+    work.commands.run("ingest", options.matches, "--store", work.out / "store", made=work.out / "store")
     clones = {team: work.clone(team, [team]) for team in options.teams}
     clones[BASE] = work.clone("base", options.teams)
     adapted = work.adapted()

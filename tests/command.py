@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
-from contextlib import chdir, redirect_stderr, redirect_stdout
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from unittest.mock import patch
@@ -26,11 +28,27 @@ def teamclone(
     return done
 
 
+@contextmanager
+def signals_kept() -> Iterator[None]:
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
 def called(*args: object, code: int = 0, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Runs a command in this process, which saves seconds of imports; an error that it does not catch is raised."""
     words = ["teamclone", *map(str, args)]
     out, err, got = StringIO(), StringIO(), 0
-    with patch.object(sys, "argv", words), chdir(cwd or Path.cwd()), redirect_stdout(out), redirect_stderr(err):
+    with (
+        patch.object(sys, "argv", words),
+        chdir(cwd or Path.cwd()),
+        redirect_stdout(out),
+        redirect_stderr(err),
+        signals_kept(),
+    ):
         try:
             main()
         except SystemExit as end:

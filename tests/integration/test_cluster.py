@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from command import TEAMCLONE, teamclone
+from command import TEAMCLONE, called
 from playing import strays, write_schedule
 from teamclone.errors import UsageError
 from teamclone.play.runner import _play_match, _Task
@@ -122,17 +122,17 @@ def test_a_cluster_gives_what_one_machine_gives(cluster: Cluster, samples_dir: P
     logs = some(samples_dir, tmp_path / "logs", n=3)
     on_cluster = ("--scheduler", cluster.address)
     here, there = tmp_path / "here", tmp_path / "there"
-    teamclone("ingest", "logs", "--store", here, "--jobs", "1", cwd=tmp_path)
+    called("ingest", "logs", "--store", here, "--jobs", "1", cwd=tmp_path)
     # A relative path: the workers are in another folder.
-    done = teamclone("ingest", "logs", "--store", "there", *on_cluster, cwd=tmp_path)
+    done = called("ingest", "logs", "--store", "there", *on_cluster, cwd=tmp_path)
     assert "files: 6 ok, 0 partial, 0 failed" in done.stdout
     assert "matches: 3 added, 0 replaced, 0 there before" in done.stdout
     assert content(there) == content(here)
-    assert "3 there before" in teamclone("ingest", logs, "--store", there, *on_cluster).stdout
+    assert "3 there before" in called("ingest", logs, "--store", there, *on_cluster).stdout
 
     make = ("dataset", "--team", "HELIOS_base", "--store")
-    teamclone(*make, here, "--out", tmp_path / "ds", "--jobs", "1")
-    teamclone(*make, "there", "--out", "ds there", *on_cluster, cwd=tmp_path)
+    called(*make, here, "--out", tmp_path / "ds", "--jobs", "1")
+    called(*make, "there", "--out", "ds there", *on_cluster, cwd=tmp_path)
     assert content(tmp_path / "ds there") == content(tmp_path / "ds")
 
 
@@ -149,7 +149,7 @@ def test_a_killed_worker_costs_no_match(cluster: Cluster, samples_dir: Path, tmp
     assert "files: 8 ok, 0 partial, 0 failed" in out
     assert "matches: 4 added, 0 replaced, 0 there before" in out
     assert list((root / "unfinished").iterdir()) == []
-    teamclone("ingest", logs, "--store", tmp_path / "here")
+    called("ingest", logs, "--store", tmp_path / "here")
     assert content(root) == content(tmp_path / "here")
 
 
@@ -167,7 +167,7 @@ def test_a_lost_scheduler_is_one_line_and_costs_no_match(cluster: Cluster, sampl
     assert err.count("\n") == 1, err
     before = len(open_store(root).match_ids())
     assert before >= 1
-    done = teamclone("ingest", logs, "--store", root)
+    done = called("ingest", logs, "--store", root)
     assert "files: 8 ok, 0 partial, 0 failed" in done.stdout
     assert f"matches: {4 - before} added, 0 replaced, {before} there before" in done.stdout
 
@@ -186,8 +186,8 @@ def test_nobody_answers(scheduler: Cluster, fixtures_dir: Path, tmp_path: Path) 
         assert process.returncode == 1
         assert err.startswith(text), err
         assert err.count("\n") == 1, err
-    assert "expected the address of a Dask scheduler, tcp://host:port" in teamclone(*run, "cluster7", code=2).stderr
-    assert "--jobs" in teamclone(*run, scheduler.address, "--jobs", "2", code=2).stderr
+    assert "expected the address of a Dask scheduler, tcp://host:port" in called(*run, "cluster7", code=2).stderr
+    assert "--jobs" in called(*run, scheduler.address, "--jobs", "2", code=2).stderr
 
 
 def test_a_worker_that_does_not_see_the_logs(fixtures_dir: Path, tmp_path: Path) -> None:

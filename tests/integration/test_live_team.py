@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import teamclone as tc
-from command import TEAMCLONE, teamclone
+from command import TEAMCLONE, called, teamclone
 from playing import STANDIN, both_servers, write_schedule
 from teamclone.dataset.build import DatasetConfig
 from teamclone.logs import read_match
@@ -112,19 +112,19 @@ def test_a_clone_of_play_on_alone_is_refused_with_what_to_do(
     store = tc.open_store(run.parent / "store")
     tc.build_dataset(DatasetConfig(teams=("HELIOS_base",)), store=store, out=tmp_path / "ds", jobs=1)
     tc.train(load_config("best", settings), tc.open_dataset(tmp_path / "ds"), tmp_path / "run")
-    done = teamclone("live", "team", tmp_path / "run", code=2)
+    done = called("live", "team", tmp_path / "run", code=2)
     assert "knows no catch and no move" in done.stderr
     assert "--preset play" in done.stderr
 
 
 def test_where_no_server_is_it_says_so(run: Path) -> None:
-    done = teamclone("live", "team", run, "--port", "1", "--connect-s", "1", code=1)
+    done = called("live", "team", run, "--port", "1", "--connect-s", "1", code=1)
     assert re.search(r"no server answers at 127\.0\.0\.1:1 after 1 s", done.stderr)
 
 
 @pytest.mark.parametrize("name", ["A B", "(x)", "x" * 16])
 def test_names_that_no_server_takes_are_refused(run: Path, name: str) -> None:
-    done = teamclone("live", "team", run, "--name", name, code=2)
+    done = called("live", "team", run, "--name", name, code=2)
     assert "1 to 15 letters" in done.stderr
 
 

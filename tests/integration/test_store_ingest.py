@@ -17,7 +17,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from command import teamclone
+from command import called
 from disk import small_disk
 from teamclone.errors import LogError, StoreError, UsageError
 from teamclone.logs import LogPair, Match
@@ -305,7 +305,7 @@ def children(pid: int) -> list[int]:
 
 
 def workers(pid: int) -> list[int]:
-    return [child for child in children(pid) if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+    return [child for server in children(pid) for child in children(server)]
 
 
 def alive(pid: int) -> bool:
@@ -376,13 +376,13 @@ def test_a_full_disk_costs_no_match(fixtures_dir: Path, tmp_path: Path) -> None:
     """Short of room for the second match, the first stays, and with room the ingest goes on."""
     logs = [fixtures_dir / "json", fixtures_dir / "v6"]
     for log in logs:
-        teamclone("ingest", log, "--store", tmp_path / "whole", "--jobs", "1")
+        called("ingest", log, "--store", tmp_path / "whole", "--jobs", "1")
     sizes = sorted(
         sum(path.stat().st_size for path in match.iterdir()) for match in (tmp_path / "whole" / "matches").iterdir()
     )
     with small_disk(tmp_path / "disk", kilobytes=(sizes[0] + sizes[1] // 2) // 1024 + 100) as disk:
         root = disk / "store"
-        done = teamclone("ingest", *logs, "--store", root, "--jobs", "1", code=1)
+        done = called("ingest", *logs, "--store", root, "--jobs", "1", code=1)
         assert done.stderr.startswith(f"teamclone: {root}: the disk is full; make room and ingest again"), done.stderr
         assert done.stderr.count("\n") == 1
         assert len(open_store(root).match_ids()) <= 1
@@ -397,10 +397,10 @@ def test_a_store_on_a_read_only_disk(fixtures_dir: Path, tmp_path: Path) -> None
         root = disk / "store"
         assert ingest([fixtures_dir / "v6"], create_store(root), jobs=1).added == 1
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
-        done = teamclone("ingest", fixtures_dir / "json", "--store", root, code=1)
+        done = called("ingest", fixtures_dir / "json", "--store", root, code=1)
         assert done.stderr.startswith(f"teamclone: {root}: cannot be written (Read-only file system)"), done.stderr
-        assert "HELIOS_base" in teamclone("matches", "--store", root).stdout
-        teamclone("dataset", "--store", root, "--team", "HELIOS_base", "--out", tmp_path / "ds", "--split", "rows")
+        assert "HELIOS_base" in called("matches", "--store", root).stdout
+        called("dataset", "--store", root, "--team", "HELIOS_base", "--out", tmp_path / "ds", "--split", "rows")
 
 
 def test_two_ingests_at_once(samples_dir: Path, tmp_path: Path) -> None:
@@ -409,7 +409,7 @@ def test_two_ingests_at_once(samples_dir: Path, tmp_path: Path) -> None:
     first = start(samples_dir, root)
     try:
         wait_for(lambda: first.poll() is not None or (root / ".lock").exists(), "lock")
-        second = teamclone("ingest", samples_dir, "--store", root, code=1)
+        second = called("ingest", samples_dir, "--store", root, code=1)
         out, err = first.communicate(timeout=300)
     finally:
         first.kill()

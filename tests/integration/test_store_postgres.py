@@ -15,7 +15,7 @@ import pytest
 
 from command import TEAMCLONE, called, teamclone
 from postgres import DATABASE, ENCODED, PASSWORD, Server, start_server
-from teamclone.dataset.build import DatasetConfig, build_dataset
+from teamclone.dataset.build import DatasetConfig, SplitBy, build_dataset
 from teamclone.logs import read_match
 from teamclone.store import Store, create_store, ingest, open_store, schema
 from teamclone.store.postgres.location import Location
@@ -35,6 +35,15 @@ def samples(samples_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     folder = tmp_path_factory.mktemp("samples")
     for path in sorted(samples_dir.glob("*.rc?.xz"))[: 2 * N_MATCHES]:
         shutil.copy(path, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def small(fixtures_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two short matches with their command logs."""
+    folder = tmp_path_factory.mktemp("small")
+    for name in ("json", "v6"):
+        shutil.copytree(fixtures_dir / name, folder / name)
     return folder
 
 
@@ -103,10 +112,12 @@ def test_every_command_takes_the_url(url: str, fixtures_dir: Path, tmp_path: Pat
     assert not [text for text in shown if PASSWORD in text or ENCODED in text]
 
 
-def test_a_dataset_is_the_same_from_either_store(url: str, samples: Path, reference: Store, tmp_path: Path) -> None:
-    assert ingest([samples], create_store(url), jobs=1).added == N_MATCHES
+def test_a_dataset_is_the_same_from_either_store(url: str, small: Path, tmp_path: Path) -> None:
+    reference = create_store(tmp_path / "reference")
+    for store in (reference, create_store(url)):
+        assert ingest([small], store, jobs=1).added == N_MATCHES
     same(open_store(url), reference)
-    config = DatasetConfig(teams=("HELIOS_base",))
+    config = DatasetConfig(teams=("HELIOS_base",), split=SplitBy.ROWS)
     for name, store, jobs in (("parquet", reference, 1), ("postgresql", open_store(url), 2)):
         build_dataset(config, store=store, out=tmp_path / name, jobs=jobs)
     files = {path.relative_to(tmp_path / "parquet") for path in (tmp_path / "parquet").rglob("*") if path.is_file()}
@@ -123,8 +134,10 @@ def test_a_dataset_is_the_same_from_either_store(url: str, samples: Path, refere
     assert len(ids) == 1
 
 
-def test_two_ingests_at_once(url: str, samples: Path, reference: Store) -> None:
-    both = [start("ingest", samples, "--store", url, "--jobs", 1, "--json") for _ in range(2)]
+def test_two_ingests_at_once(url: str, small: Path, tmp_path: Path) -> None:
+    reference = create_store(tmp_path / "reference")
+    ingest([small], reference, jobs=1)
+    both = [start("ingest", small, "--store", url, "--jobs", 1, "--json") for _ in range(2)]
     reports = []
     for process in both:
         out, err = process.communicate(timeout=300)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 NEEDED = ("catch", "move")
 """Commands without which a clone cannot play a whole match."""
 
+NAMES = "a server takes 1 to 15 letters, digits and signs of _.+-"
+
 
 def team(
     run: Annotated[Path, typer.Argument(help="Run folder of a clone that was trained on whole matches.")],
@@ -40,10 +42,13 @@ def team(
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> None:
     """Play a match with the clone as a team: eleven players and a coach."""
+    from teamclone.protocol.agent import NAME
+
+    if name is not None and not NAME.fullmatch(name):
+        raise UsageError(f"--name {name!r}: {NAMES}")
     from teamclone.api import load
     from teamclone.live.decisions import Decisions, Draw
     from teamclone.live.team import Team
-    from teamclone.protocol.agent import NAME
     from teamclone.training.line_up import read_line_up
 
     signal.signal(signal.SIGTERM, _stop)
@@ -57,7 +62,7 @@ def team(
     line_up = read_line_up(clone.run.path)
     called = name or line_up.team
     if not NAME.fullmatch(called):
-        raise UsageError(f"--name {called!r}: a server takes 1 to 15 letters, digits and signs of _.+-")
+        raise UsageError(f"{run}: its team is called {called!r}; give a --name: {NAMES}")
     drawn = Draw.NOTHING if deterministic else choice(Draw, draw, option="--draw")
     decisions = Decisions(clone.compiled(), draw=drawn, seed=seed)
     decisions.load()

@@ -6,7 +6,6 @@ learns in return whether to give the trial up.
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,7 +23,7 @@ from teamclone.search.trials import (
     Status,
     Trial,
 )
-from teamclone.system.workers import start_worker
+from teamclone.system.workers import process_context, start_worker
 from teamclone.training import loop
 from teamclone.training.config import Config
 from teamclone.training.run import is_run, open_run, save_config
@@ -60,7 +59,7 @@ class Worker:
         self._start()
 
     def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
+        context = process_context(__name__)
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs, self.dataset), daemon=True)
         with _no_interrupts():

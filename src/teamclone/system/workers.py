@@ -19,9 +19,12 @@ from concurrent.futures import (
     wait,
 )
 from itertools import islice
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from teamclone.errors import ClusterError
+
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkServerContext, SpawnContext
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -137,21 +140,20 @@ class Processes(Executor):
 
     def _call(self, function: Callable[..., R], *args: Any, **options: Any) -> R:
         try:
-            return self._pool().submit(function, *args, **options).result()
+            return self._pool(function).submit(function, *args, **options).result()
         except BrokenExecutor:
             self._own.pool = None
         try:
-            return self._pool().submit(function, *args, **options).result()
+            return self._pool(function).submit(function, *args, **options).result()
         except BrokenExecutor:
             self._own.pool = None
             raise
 
-    def _pool(self) -> ProcessPoolExecutor:
-        """Return the one process of this thread."""
+    def _pool(self, function: Callable[..., Any]) -> ProcessPoolExecutor:
+        """Return the one process of this thread, started for a function if there is none."""
         pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
         if pool is None:
-            # Spawned, not forked: threads of Arrow and DuckDB do not survive a fork.
-            context = multiprocessing.get_context("spawn")
+            context = process_context(function.__module__)
             pool = self._own.pool = ProcessPoolExecutor(1, mp_context=context, initializer=start_worker)
             self._pools.append(pool)
         return pool
@@ -161,6 +163,19 @@ class Processes(Executor):
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         for pool in self._pools:
             pool.shutdown(wait)
+
+
+def process_context(module: str) -> SpawnContext | ForkServerContext:
+    """Return how processes for the functions of a module are started, each without the threads of this one.
+
+    Where the system can, a server that imports the module once forks them, so that many are there as soon as one. A
+    fork of this process would not do: threads of Arrow and DuckDB do not survive it.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["__main__", module])  # does nothing if the server runs
+    return context
 
 
 def start_worker() -> None:

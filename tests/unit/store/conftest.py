@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from postgres import Server
 from teamclone.logs import Match, read_match
 from teamclone.store import Store, create_store
 
@@ -14,11 +15,15 @@ MakeStore = Callable[[], Store]
 
 
 @pytest.fixture(params=["parquet", "postgresql"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
     """An empty store of every back end: what is tested with it is the contract of ``Store``."""
     if request.param == "parquet":
-        return create_store(tmp_path / "store")
-    return create_store(request.getfixturevalue("postgres").new_url())
+        yield create_store(tmp_path / "store")
+        return
+    server: Server = request.getfixturevalue("postgres")
+    url = server.new_url()
+    yield create_store(url)
+    server.drop(url)
 
 
 def only_log(folder: Path, suffix: str) -> Path:

@@ -4,9 +4,9 @@
 
 MATCHES is a folder of logs in which both teams have the full state, with the folders `tournament/` (neither has it) and
 `cyrus2014/`. Each entry of the panel is a team in one of these conditions: its dataset is split by whole matches, one
-clone is trained with each seed and tested on matches that none of them saw. Entries whose matches are not there are
-named and left out. What is there in DIR is not done again, so a benchmark that was interrupted goes on. The page is
-written anew at the end, from all results that there are.
+clone is trained with each seed, or adapted from a clone of other teams, and tested on matches that none of them saw.
+Entries whose matches are not there are named and left out. What is there in DIR is not done again, so a benchmark that
+was interrupted goes on. The page is written anew at the end, from all results that there are.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from teamclone.evaluation.predict import predict
 from teamclone.system.documents import write_document
 from teamclone.system.files import write_atomic
 from teamclone.system.workers import available_cpus
+from teamclone.training.adapt import adaptation
 from teamclone.training.config import load_config
 from teamclone.training.run import open_run
 
@@ -57,28 +58,47 @@ class Entry:
     """A team in some conditions.
 
     Attributes:
-        title, view: in words. store: of STORES. selection: options of `teamclone dataset` beside team and store.
+        view: in words. others: teams that its clones learn beside it.
+        store: of STORES. selection: options of `teamclone dataset` beside teams and store.
         preset: to train with. overrides: settings beside it.
-        like: the entry whose clones are tested here, in place of own ones. goal: None where there is none.
+        like: the entry whose clones are tested here, in place of own ones.
+        base: the entry whose clones are adapted, in place of training fresh ones. goal: None where there is none.
     """
 
     name: str
     team: str
     view: str
     store: str
+    others: tuple[str, ...] = ()
     selection: tuple[str, ...] = ()
     preset: str = "best"
     overrides: tuple[str, ...] = ()
     like: str | None = None
+    base: str | None = None
     goal: Goal | None = None
+
+    def adapted(self, base: str) -> Entry:
+        """The same team in the same matches, by clones that are adapted from another entry's."""
+        view = f"{self.view}; adapted"
+        return replace(self, name=f"{self.name}-adapted", view=view, preset="best", like=None, base=base)
+
+    @property
+    def data(self) -> str:
+        """What its dataset is called; an adapted clone has the one of the entry beside it."""
+        return self.name.removesuffix("-adapted")
+
+    @property
+    def teams(self) -> str:
+        return ", ".join((self.team, *self.others))
 
 
 def held_out(*matches: str) -> tuple[str, ...]:
     return tuple(part for match in matches for part in ("--test-match", match))
 
 
+_HELIOS_IN_TOURNAMENT = Goal(accuracy=0.92, cross_entropy=0.19, kick_median=6, kick_mean=18)
 _IN_TOURNAMENT = (*held_out("20261128134452", "20261128134549"), "--validation-match", "20261128134050")
-PANEL = (
+_TRAINED = (
     Entry(
         name="helios",
         team="HELIOS_base",
@@ -102,7 +122,7 @@ PANEL = (
         store="tournament",
         selection=("--percepts", *_IN_TOURNAMENT),
         preset="tournament",
-        goal=Goal(accuracy=0.92, cross_entropy=0.19, kick_median=6, kick_mean=18),
+        goal=_HELIOS_IN_TOURNAMENT,
     ),
     Entry(
         name="yushan",
@@ -133,7 +153,34 @@ PANEL = (
         store="all",
         goal=Goal(accuracy=0.91, cross_entropy=0.22, kick_median=10, kick_mean=25),
     ),
+    Entry(
+        name="base",
+        team="HELIOS_base",
+        others=("WEBase", "Cyrus2DBase"),
+        view="full state",
+        store="full",
+        selection=("--unseen", "YuShan2024", *held_out(*TEST_MATCHES)),
+    ),
+    Entry(
+        name="base-without-webase",
+        team="HELIOS_base",
+        others=("Cyrus2DBase", "YuShan2024"),
+        view="full state, YuShan2024 without",
+        store="full",
+        selection=("--unseen", "WEBase"),
+    ),
 )
+_TRAINED_BY_NAME = {entry.name: entry for entry in _TRAINED}
+PANEL = (
+    *_TRAINED,
+    replace(
+        _TRAINED_BY_NAME["helios-in-tournament"].adapted("base"), view="tournament; adapted", goal=_HELIOS_IN_TOURNAMENT
+    ),
+    _TRAINED_BY_NAME["yushan"].adapted("base"),
+    _TRAINED_BY_NAME["cyrus2014"].adapted("base"),
+    _TRAINED_BY_NAME["webase"].adapted("base-without-webase"),
+)
+BY_NAME = {entry.name: entry for entry in PANEL}
 
 
 def logs(matches: Path, store: str) -> list[Path]:
@@ -160,20 +207,22 @@ class Work:
 
     def data(self, entry: Entry, commands: Commands) -> Path:
         """The dataset of an entry, made if it is not there."""
-        made = self.out / "datasets" / entry.name
+        made = self.out / "datasets" / entry.data
+        teams = (part for team in (entry.team, *entry.others) for part in ("--team", team))
         commands.run(
-            *("dataset", "--store", self._store(entry.store, commands), "--team", entry.team, *entry.selection),
+            *("dataset", "--store", self._store(entry.store, commands), *teams, *entry.selection),
             *("--commands", "received", "--train-goalkeepers", "--out", made),
             made=made,
         )
         return made
 
     def settings(self, entry: Entry, seed: int) -> list[str]:
-        """What a clone is trained with, beside its preset."""
-        return [*entry.overrides, *self.options.set, f"train.seed={seed}"]
+        """What a clone is trained with, beside its preset; or adapted with, beside the settings of its base."""
+        of_preset = () if entry.base else (*entry.overrides, *self.options.set)
+        return [*of_preset, f"train.seed={seed}"]
 
     def run(self, entry: Entry, seed: int, data: Path, commands: Commands) -> Path:
-        """The run of an entry, trained and evaluated if it is not.
+        """The run of an entry, trained and evaluated if it is not; a base is there before.
 
         Raises:
             SystemExit: a command failed; or the run is there, of other settings.
@@ -183,15 +232,17 @@ class Work:
         overrides = (*self.settings(entry, seed), f"train.threads={self.threads}")
         if not ended.is_file():
             shutil.rmtree(run, ignore_errors=True)
+        base = self.out / "runs" / f"{entry.base}-{seed}"
         seconds = commands.run(
-            *("train", data, "--preset", entry.preset),
+            *(("adapt", base, data) if entry.base else ("train", data, "--preset", entry.preset)),
             *(part for setting in overrides for part in ("--set", setting)),
             *("--out", run),
             made=ended,
         )
         if seconds is not None:
             write_document(ended, {"seconds": seconds})
-        config = load_config(entry.preset, self.settings(entry, seed))
+        settings = self.settings(entry, seed)
+        config = adaptation(open_run(base), settings)[0] if entry.base else load_config(entry.preset, settings)
         if replace(open_run(run).config, train=config.train) != config:
             sys.exit(f"{run}: trained with other settings; remove it, or choose another --out")
         commands.run("evaluate", run, made=run / "evaluation.json")
@@ -204,6 +255,8 @@ class Work:
             SystemExit: a command failed; or what is there was made with other settings.
         """
         path, settings = self.out / "results" / f"{entry.name}-{seed}.json", self.settings(entry, seed)
+        if entry.base:
+            settings = [*self.settings(BY_NAME[entry.base], seed), *settings]
         if path.is_file():
             if json.loads(path.read_text(encoding="utf-8"))["settings"] != settings:
                 sys.exit(f"{path}: made with other settings, now {settings}; remove it, or choose another --out")
@@ -291,7 +344,7 @@ def figures_of(
     model, kicks = [test["model"] for test in tests], [test["parameters"]["kick_direction"] for test in tests]
     goal = entry.goal
     return [
-        entry.team,
+        entry.teams,
         entry.view,
         f"{sum(match['split'] == 'train' for match in trained_on)} / {len(tests[0]['matches'])}",
         spread([value(one["accuracy"]) for one in model], 3),
@@ -310,7 +363,7 @@ def intervals_of(entry: Entry, result: Mapping[str, Any]) -> list[str]:
     test = result["splits"]["test"]
     kick = test["parameters"]["kick_direction"]
     return [
-        entry.team,
+        entry.teams,
         entry.view,
         f"{test['rows']:,}",
         f"{kick['rows']:,}",
@@ -328,7 +381,7 @@ def commands_of(entry: Entry, results: Sequence[Mapping[str, Any]]) -> list[str]
         return number(float(np.mean([value(test[part][name][figure]) for test in tests])), digits)
 
     return [
-        entry.team,
+        entry.teams,
         entry.view,
         *(of("commands", kind, "recall", 2) for kind in ("turn", "kick", "tackle")),
         *(of("parameters", name, "mean", 1) for name in ("dash_power", "dash_direction", "turn_moment", "kick_power")),
@@ -345,7 +398,7 @@ def left_of(entry: Entry, work: Work, results: Sequence[Mapping[str, Any]]) -> l
     test = np.mean([value(result["splits"]["test"]["model"]["cross_entropy"]) for result in results])
     trained = np.mean([result["trained"]["train_cross_entropy"] for result in results])
     return [
-        entry.team,
+        entry.teams,
         entry.view,
         *(percent(by[name]["share_of_nats"] if name in by else None) for name in SITUATIONS),
         "" if entry.like else f"{trained:.3f}, {test:.3f}",
@@ -369,7 +422,9 @@ tournaments, from as many matches as there are. `make fidelity MATCHES=folder` r
 figure on it is typed by hand.""",
         "## Goals and figures",
         f"""Commands of field players in play_on, whole test matches, presets as in [the commands](#reproduce){beside};
-{counted}. The goals are those that we set ourselves. [What the figures mean](figures.md).""",
+{counted}. `adapted` clones go on from the clone of several teams that has not seen a match of theirs; that of
+HELIOS_base from one that knows it with the full state. The goals are those that we set ourselves. [What the figures
+mean](figures.md).""",
         table(
             HEADERS,
             [
@@ -433,17 +488,21 @@ def wanted(options: argparse.Namespace) -> list[Entry]:
     Raises:
         SystemExit: there is no such entry.
     """
-    known = {entry.name: entry for entry in PANEL}
-    if unknown := sorted(set(options.only) - set(known)):
-        sys.exit(f"--only: no {', '.join(unknown)}; there are {', '.join(known)}")
-    chosen = {*options.only, *(known[name].like for name in options.only)}
+    if unknown := sorted(set(options.only) - set(BY_NAME)):
+        sys.exit(f"--only: no {', '.join(unknown)}; there are {', '.join(BY_NAME)}")
+    chosen = {*options.only, *(BY_NAME[name].like or BY_NAME[name].base for name in options.only)}
     found = []
     for entry in (entry for entry in PANEL if entry.name in chosen):
         load_config(entry.preset, (*entry.overrides, *options.set))  # a wrong setting is reported before the work
-        if any(entry.team in path.name for path in logs(options.matches, entry.store)):
-            found.append(entry)
+        names = [path.name for path in logs(options.matches, entry.store)]
+        missing = [team for team in (entry.team, *entry.others) if not any(team in name for name in names)]
+        if missing:
+            where = f"{options.matches}/{STORES[entry.store]}"
+            print(f"{entry.name}: no match of {', '.join(missing)} in {where}", file=sys.stderr)
+        elif entry.base and BY_NAME[entry.base] not in found:
+            print(f"{entry.name}: nothing to adapt without {entry.base}", file=sys.stderr)
         else:
-            print(f"{entry.name}: no match of {entry.team} in {options.matches}/{STORES[entry.store]}", file=sys.stderr)
+            found.append(entry)
     return found
 
 
@@ -455,7 +514,8 @@ def main() -> None:
         work.data(entry, work.commands())
     failed = []
     for of_others in (False, True):
-        tasks = [(entry, seed) for seed in range(options.seeds) for entry in entries if bool(entry.like) == of_others]
+        chosen = [entry for entry in entries if bool(entry.like or entry.base) == of_others]
+        tasks = [(entry, seed) for seed in range(options.seeds) for entry in chosen]
         with ThreadPoolExecutor(options.jobs) as pool:
             for error in pool.map(lambda task: work.tried(*task), tasks):
                 failed += [error] if error else []

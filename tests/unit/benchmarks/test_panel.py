@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import panel
@@ -12,6 +13,7 @@ from tests.synthetic import make_dataset
 
 from teamclone.dataset.reader import open_dataset
 from teamclone.evaluation.evaluate import evaluate_and_save
+from teamclone.training.adapt import adaptation
 from teamclone.training.config import load_config
 from teamclone.training.loop import train
 from teamclone.training.run import open_run
@@ -29,11 +31,11 @@ def options(out: Path, *more: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A benchmark of two entries, all commands of which have been run: one has a clone, the other tests it."""
+    """All commands of three entries have been run: one has a clone, one tests it, one adapts it."""
     folder = tmp_path_factory.mktemp("panel")
-    for name in ("full", "tournament"):
+    for name in ("full", "tournament", "all"):
         (folder / "stores" / name).mkdir(parents=True)
-    for name, frames in (("helios", 120), ("helios-in-tournament", 110)):
+    for name, frames in (("helios", 120), ("helios-in-tournament", 110), ("yushan", 100)):
         make_dataset(folder / "datasets" / name, frames_per_match=frames)
     run = folder / "runs" / "helios-0"
     data = open_dataset(folder / "datasets" / "helios")
@@ -41,6 +43,12 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "runs" / "helios-0.json").write_text('{"seconds": 61.0}')
     evaluate_and_save(open_run(run))
     evaluate_and_save(open_run(run), dataset=folder / "datasets" / "helios-in-tournament")
+    base = Path(shutil.copytree(run, folder / "runs" / "base-0"))
+    config, start = adaptation(open_run(base), ["train.seed=0", "train.threads=1"])
+    adapted = folder / "runs" / "yushan-adapted-0"
+    train(config, open_dataset(folder / "datasets" / "yushan"), adapted, base=start)
+    (folder / "runs" / "yushan-adapted-0.json").write_text('{"seconds": 9.0}')
+    evaluate_and_save(open_run(adapted))
     return folder
 
 
@@ -50,24 +58,26 @@ def work(out: Path, *more: str) -> panel.Work:
 
 def test_results_are_kept_and_their_page_has_their_numbers(out: Path) -> None:
     made = work(out)
-    for entry in panel.PANEL[:2]:
-        assert made.tried(entry, 0) is None
+    for name in ("helios", "helios-in-tournament", "yushan-adapted"):
+        assert made.tried(panel.BY_NAME[name], 0) is None
     before = {path: path.stat().st_mtime_ns for path in (out / "results").iterdir()}
     assert made.tried(panel.PANEL[0], 0) is None
     assert {path: path.stat().st_mtime_ns for path in (out / "results").iterdir()} == before
     text = panel.page(made, made.results())
-    for name, evaluation in (
-        ("full state", "evaluation.json"),
-        ("tournament, trained with full state", "evaluation-helios-in-tournament.json"),
+    for team, evaluation in (
+        ("HELIOS_base | full state", "helios-0/evaluation.json"),
+        ("HELIOS_base | tournament, trained with full state", "helios-0/evaluation-helios-in-tournament.json"),
+        ("YuShan2024 | tournament; adapted", "yushan-adapted-0/evaluation.json"),
     ):
-        model = json.loads((out / "runs" / "helios-0" / evaluation).read_text())["splits"]["test"]["model"]
-        row = next(line for line in text.splitlines() if line.startswith(f"| HELIOS_base | {name} |"))
+        model = json.loads((out / "runs" / evaluation).read_text())["splits"]["test"]["model"]
+        row = next(line for line in text.splitlines() if line.startswith(f"| {team} |"))
         assert f"| {model['accuracy']['value']:.3f} |" in row
         assert f"| {model['cross_entropy']['value']:.3f} |" in row
     assert "| 0.955 |" in text
     assert "seeds" not in re.search(r"## Goals.*?\n\n(.*?)\n\n", text, re.DOTALL)[1]
     assert "teamclone train DIR/datasets/helios --preset best --set data.batch_size=128" in text
     assert "teamclone evaluate DIR/runs/helios-0 --data DIR/datasets/helios-in-tournament" in text
+    assert "teamclone adapt DIR/runs/base-0 DIR/datasets/yushan --set train.seed=0" in text
 
 
 def test_what_was_made_with_other_settings_is_not_taken(out: Path) -> None:
@@ -89,6 +99,13 @@ def test_entries_without_matches_are_named(tmp_path: Path, capsys: pytest.Captur
     chosen = panel.parser().parse_args([str(tmp_path), "--out", "OUT"])
     assert [entry.name for entry in panel.wanted(chosen)] == ["helios", "webase"]
     assert "yushan: no match of YuShan2024" in capsys.readouterr().err
+    (tmp_path / "2-WEBase_1-vs-Cyrus2DBase_0.rcg.xz").touch()
+    assert "base" in [entry.name for entry in panel.wanted(chosen)]
+    chosen.only = ["webase-adapted"]
+    assert panel.wanted(chosen) == []
+    said = capsys.readouterr().err
+    assert "base-without-webase: no match of YuShan2024 in" in said
+    assert "webase-adapted: nothing to adapt without base-without-webase" in said
     chosen.only = ["helios-in-tournament", "nobody"]
     with pytest.raises(SystemExit, match="no nobody; there are helios,"):
         panel.wanted(chosen)

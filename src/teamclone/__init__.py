@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from teamclone.report.page import make_report
     from teamclone.scout.scout import scout_team
     from teamclone.scout.write import write_scout
+    from teamclone.similarity.similar import Similarity, similar, write_similarity
     from teamclone.store.ingest import ingest
     from teamclone.store.opening import create_store, open_store
     from teamclone.training.config import load_config
@@ -77,6 +78,9 @@ _HOME = {
     "compare": "comparison.compare",
     "Comparison": "comparison.compare",
     "write_comparison": "comparison.compare",
+    "similar": "similarity.similar",
+    "Similarity": "similarity.similar",
+    "write_similarity": "similarity.similar",
     "scout_team": "scout.scout",
     "write_scout": "scout.write",
     "plot": "plot",
@@ -98,6 +102,7 @@ __all__ = [
     "PredictionTable",
     "Rules",
     "Run",
+    "Similarity",
     "TeamStatistics",
     "TeamcloneError",
     "World",
@@ -119,12 +124,14 @@ __all__ = [
     "plot",
     "read_match",
     "scout_team",
+    "similar",
     "step",
     "team_statistics",
     "train",
     "view",
     "write_comparison",
     "write_scout",
+    "write_similarity",
 ]
 
 

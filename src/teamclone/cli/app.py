@@ -30,6 +30,7 @@ from teamclone.cli import (
     rollout,
     scout,
     search,
+    similar,
     sql,
     train,
     validate,
@@ -82,6 +83,7 @@ for command in (
     report.report,
     bench.bench,
     compare.compare,
+    similar.similar,
     scout.scout,
     export.export,
 ):

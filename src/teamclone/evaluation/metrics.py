@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 CALIBRATION_BINS = 15
+MOST_LOSS = 20.0
+"""Log loss of a command that a clone holds for impossible, nats, in means: one infinity would be all of them."""
 
 
 def even_log_loss(commands: Sequence[str]) -> dict[str, float]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from teamclone.errors import DatasetError, TeamcloneError
+from teamclone.errors import TeamcloneError
 from teamclone.evaluation.match_columns import MatchColumns
+from teamclone.evaluation.metrics import MOST_LOSS
 from teamclone.events.definitions import CONTROL_M
 from teamclone.rcss.players import N_TEAM
 from teamclone.replay.predictions import DRAWS
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
     from teamclone.evaluation.prediction_table import PredictionTable
     from teamclone.models.clone import Clone
-    from teamclone.training.run import Run
 
 Texts = NDArray[np.object_]
 
@@ -40,8 +40,6 @@ SURPRISES = 10
 """So many are kept of a match."""
 SHOWN = 6
 """And so many shown of all."""
-MOST_LOSS = 20.0
-"""Log loss of a command that the clone holds for impossible, nats: infinity would be that of every mean."""
 PHASES = ("without the ball", "with the ball at nobody", "with the ball")
 """By whose the ball is: ``Seen.has``, plus one."""
 LOSS, RIGHT, SURE_RIGHT, COUNT = range(4)
@@ -122,7 +120,7 @@ class Foresight:
         """
         there = {one.match_id for one in subject.played}
         matches = [one for one in matches if one.match_id in there]
-        trained = _trained_on(self.run)
+        trained = self.run.learned_from()
         new = [one for one in matches if trained is not None and one.match_id not in trained]
         chosen = (new or matches)[-self.most :]
         looks: list[Look] = []
@@ -146,23 +144,6 @@ class Foresight:
         kept = Looks(looks, MEASURES)
         kept.shown = frozenset(shown)
         return tell_predicted(kept, notes)
-
-
-def _trained_on(run: Run) -> set[str] | None:
-    """Return the matches that the clone learned from; None where its dataset is gone."""
-    from teamclone.dataset.layout import Split
-    from teamclone.dataset.reader import open_dataset
-
-    try:
-        dataset = open_dataset(run.dataset_path)
-    except DatasetError:
-        return None
-    learned = {split.name.lower() for split in (Split.TRAIN, Split.VALIDATION)}
-    return (
-        {one["match_id"] for one in dataset.matches if one["split"] in learned}
-        if dataset.id == run.dataset_id
-        else None
-    )
 
 
 def _learned(new: Sequence[TeamMatch], trained: set[str] | None) -> str:

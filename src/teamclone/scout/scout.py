@@ -189,7 +189,7 @@ def _chosen(
         if name not in there:
             raise UsageError(f"no match of {team!r} against {name!r}; {choose(name, there)}")
     chosen = []
-    for one in sorted(found, key=lambda match: (_started(match), match.match_id)):
+    for one in sorted(found, key=lambda match: (match.started, match.match_id)):
         if one.error is not None:
             continue
         if reason := _reason(one, opponents):
@@ -210,13 +210,7 @@ def _split(matches: Sequence[TeamMatch], since: str | None) -> tuple[list[TeamMa
     """Return the matches before a date and those from then on; without a date all are of the second kind."""
     if since is None:
         return [], list(matches)
-    return [one for one in matches if _started(one) < since], [one for one in matches if _started(one) >= since]
-
-
-def _started(match: TeamMatch) -> str:
-    """Return when a match began as ISO text, which sorts by time; empty where the log does not say."""
-    started = match.row.get("started_at")
-    return "" if started is None else str(started.isoformat(sep=" "))
+    return [one for one in matches if one.started < since], [one for one in matches if one.started >= since]
 
 
 def _watched(
@@ -258,7 +252,7 @@ def _watch(location: str, match: TeamMatch) -> _Watched | str:
     return _Watched(
         played=Played(
             match_id=match.match_id,
-            started_at=_started(match) or None,
+            started_at=match.started or None,
             opponent=str(match.opponent),
             side=match.side,
             score=(left, right) if match.side > 0 else (right, left),

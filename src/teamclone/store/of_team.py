@@ -30,6 +30,12 @@ class TeamMatch:
     error: str | None = None
 
     @property
+    def started(self) -> str:
+        """When it began as ISO text, which sorts by time; empty where the log does not say."""
+        started = self.row.get("started_at")
+        return "" if started is None else str(started.isoformat(sep=" "))
+
+    @property
     def uncontested(self) -> str | None:
         """Why it says nothing of the team against others; None if it does."""
         if not self.opponent:

@@ -29,8 +29,9 @@ import numpy as np
 import torch
 
 from teamclone import __version__
-from teamclone.dataset.reader import Dataset
-from teamclone.errors import RunError, UsageError
+from teamclone.dataset.layout import Split
+from teamclone.dataset.reader import Dataset, open_dataset
+from teamclone.errors import DatasetError, RunError, UsageError
 from teamclone.models.clone import Clone
 from teamclone.rcss.commands import REPERTOIRE
 from teamclone.system.documents import misfit, read_document, write_document
@@ -136,6 +137,18 @@ class Run:
         """Names of the checkpoints whose weights can be loaded."""
         found = (path.stem for path in (self.path / "checkpoints").glob("[!.]*.safetensors"))
         return sorted(name for name in found if name != RESUME)
+
+    def learned_from(self) -> set[str] | None:
+        """Return the ids of its training and validation matches, and of its base's; None where a dataset is gone."""
+        try:
+            dataset = open_dataset(self.dataset_path)
+        except DatasetError:
+            return None
+        before = self.environment[BASE]["trained_on"] if BASE in self.environment else []
+        if before is None or dataset.id != self.dataset_id:
+            return None
+        learned = {split.name.lower() for split in (Split.TRAIN, Split.VALIDATION)}
+        return {*before, *(one["match_id"] for one in dataset.matches if one["split"] in learned)}
 
     def history(self) -> list[dict[str, Any]]:
         """One record per finished epoch.

@@ -10,6 +10,7 @@ import pytest
 
 from made_match import PARAMS, MadeMatch
 from teamclone.errors import DatasetError
+from teamclone.evaluation.metrics import MOST_LOSS
 from teamclone.scout import predicted
 from teamclone.scout.measures import Look, Looks
 from teamclone.scout.predicted import COUNT, LOSS, RIGHT, SURE_RIGHT, look, tell_predicted
@@ -66,7 +67,7 @@ def test_sums_by_hand() -> None:
 
 def test_what_the_clone_holds_for_impossible_does_not_make_means_infinite() -> None:
     made = look(seen(), table((0, 7, "turn", 1.0), (1, 7, "dash", 1.0)))
-    assert made.arrays["numbers"][6, LOSS] == predicted.MOST_LOSS
+    assert made.arrays["numbers"][6, LOSS] == MOST_LOSS
 
 
 def test_surprises_are_apart_and_wrong() -> None:

@@ -11,7 +11,7 @@ FIDELITY := .fidelity
 PANEL := .panel
 OPTIONS ?=
 MINUTES ?= 30
-TESTERS ?= 3
+TESTERS ?= 2
 DEMO := demo
 
 .PHONY: help install browser demo test docs notebook lint format bench fidelity ablations faults fuzz clean
@@ -58,7 +58,6 @@ demo: install
 	$(BIN)/teamclone export $(DEMO)/run --out $(DEMO)/export
 	$(BIN)/teamclone export --check $(DEMO)/export
 
-# Whole commands come first, and many of them wait for others: more testers than processors keep these busy.
 test: install browser
 	$(BIN)/python tests/kernels.py
 	$(BIN)/python -m pytest -n $(TESTERS) --dist loadscope --no-loadscope-reorder

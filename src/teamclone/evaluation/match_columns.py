@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from teamclone.dynamics.inverse.columns import recovered_commands
-from teamclone.errors import StoreError, UsageError
+from teamclone.errors import UsageError
 from teamclone.logs.columns import Source
 from teamclone.logs.match import Columns, Match, side_named
 from teamclone.rcss.player_types import FIELDS
-from teamclone.store.postgres.location import masked
+from teamclone.store import schema
 from teamclone.store.store import Store
 
 
@@ -83,11 +83,8 @@ class MatchColumns:
     @staticmethod
     def row_of(store: Store, match_id: str) -> dict[str, Any]:
         """Return the row of a match in the table ``matches``. Raises as `of_store`."""
-        row: dict[str, Any] | None = next(
-            (row for row in store.matches().to_pylist() if row["match_id"] == match_id), None
-        )
-        if row is None:
-            raise StoreError(f"{masked(store.location)}: no match {match_id}; see `teamclone matches`")
+        row: dict[str, Any]
+        (row,) = store.read_table(match_id, schema.MATCHES.name).to_pylist()
         return row
 
     def side_of(self, team: str | None, side: str | None) -> int:

@@ -17,7 +17,7 @@ from teamclone.logs import read_match
 from teamclone.similarity import geometry
 from teamclone.similarity.guess import guesses
 from teamclone.similarity.watched import Floats, Watched, watch
-from teamclone.store.of_team import TeamMatch, matches_of
+from teamclone.store.of_team import TeamMatch, matches_by_team
 from teamclone.store.postgres.location import masked
 from teamclone.store.store import Store
 from teamclone.system.documents import write_document
@@ -169,17 +169,15 @@ def _chosen(
     Raises:
         UsageError: a team is not in the store.
     """
-    names = {name for row in store.matches().to_pylist() for name in (row["left_name"], row["right_name"]) if name}
-    if unknown := sorted(set(teams) - names):
-        raise UsageError(f"{masked(store.location)}: no matches of {unknown[0]!r}; {choose(unknown[0], sorted(names))}")
+    by_team, unread = matches_by_team(store)
+    if unknown := sorted(set(teams) - set(by_team)):
+        remedy = choose(unknown[0], sorted(by_team))
+        raise UsageError(f"{masked(store.location)}: no matches of {unknown[0]!r}; {remedy}")
     learned = {run.team: run.learned_from() for run in runs}
     chosen: list[tuple[str, TeamMatch]] = []
     left_out: list[str] = []
-    failed: dict[str, None] = {}
-    for team in sorted(teams or names):
-        found = matches_of(store, team)
-        failed |= dict.fromkeys(one.error for one in found if one.error)
-        found = [one for one in found if one.error is None and not one.uncontested]
+    for team in sorted(teams or by_team):
+        found = [one for one in by_team[team] if not one.uncontested]
         seen = learned.get(team, set())
         if seen is None:
             left_out.append(f"{team}: nobody knows what its clone learned from, as its dataset is gone")
@@ -188,7 +186,7 @@ def _chosen(
         if len(found) > len(new):
             left_out.append(f"{team}: its clone learned from {len(found) - len(new)} of {len(found)} matches")
         chosen += ((team, one) for one in new[-most:])
-    return chosen, left_out, list(failed)
+    return chosen, left_out, [one.error for one in unread if one.error]
 
 
 # What is predicted

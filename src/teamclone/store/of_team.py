@@ -50,19 +50,29 @@ def matches_of(store: Store, team: str) -> list[TeamMatch]:
         UsageError: it has none.
         StoreError: the store cannot be read at all.
     """
-    found: list[TeamMatch] = []
-    names: set[str] = set()
+    found, unread = matches_by_team(store)
+    if team not in found:
+        raise UsageError(f"{masked(store.location)}: no matches of {team!r}; {choose(team, sorted(found))}")
+    return sorted([*found[team], *unread], key=lambda one: one.match_id)
+
+
+def matches_by_team(store: Store) -> tuple[dict[str, list[TeamMatch]], list[TeamMatch]]:
+    """Return the matches of every team by id, and those of which nothing can be read.
+
+    Raises:
+        StoreError: the store cannot be read at all.
+    """
+    found: dict[str, list[TeamMatch]] = {}
+    unread: list[TeamMatch] = []
     for match_id in store.match_ids():
         try:
             (row,) = store.read_table(match_id, schema.MATCHES.name).to_pylist()
         except StoreError as error:
-            found.append(TeamMatch(match_id=match_id, row={}, error=str(error)))
+            unread.append(TeamMatch(match_id=match_id, row={}, error=str(error)))
             continue
         sides = {1: row["left_name"], -1: row["right_name"]}
-        names |= {name for name in sides.values() if name}
-        side = next((side for side, name in sides.items() if name == team), None)
-        if side is not None:
-            found.append(TeamMatch(match_id=match_id, row=row, side=side, opponent=sides[-side]))
-    if team not in names:
-        raise UsageError(f"{masked(store.location)}: no matches of {team!r}; {choose(team, sorted(names))}")
-    return found
+        for team in dict.fromkeys(name for name in sides.values() if name):
+            side = next(side for side, name in sides.items() if name == team)
+            one = TeamMatch(match_id=match_id, row=row, side=side, opponent=sides[-side])
+            found.setdefault(team, []).append(one)
+    return found, unread

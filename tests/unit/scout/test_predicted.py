@@ -122,9 +122,9 @@ def foresight(monkeypatch: pytest.MonkeyPatch, trained: set[str] | None, asked: 
         return look(seen(), table((0, 7, "dash", 0.96))), f"predictions of {match.match_id}"
 
     monkeypatch.setattr(predicted, "look_predicted", foresees)
-    monkeypatch.setattr(predicted, "_trained_on", lambda run: trained)
+    run = _Asked(team=team, path=_Asked(name="run"), learned_from=lambda: trained)
     made = object.__new__(predicted.Foresight)
-    made.run, made.model, made.most, made.tables = _Asked(team=team, path=_Asked(name="run")), None, 2, {}
+    made.run, made.model, made.most, made.tables = run, None, 2, {}
     return made
 
 

@@ -163,7 +163,7 @@ def test_the_command(folder: Path, log: Path, tmp_path: Path) -> None:
     assert replay.read_text().startswith("RPL 2D 1\n")
     match_id = tc.read_match(log).match_id
     assert invoked("replay", match_id, "--store", folder / "store", "--out", out).strip() == str(out)
-    with pytest.raises(StoreError, match="no match ffff"):
+    with pytest.raises(StoreError, match="no match 'ffff"):
         invoked("replay", "ffff", "--store", folder / "store", "--out", out)
     with pytest.raises(UsageError, match="no team 'Nobody'"):
         invoked("replay", log, "--run", folder / "run", "--team", "Nobody", "--out", out)

@@ -69,7 +69,7 @@ def test_a_store_gives_the_same(log: Path, events: tc.MatchEvents, tmp_path: Pat
     again = tc.match_events(events.match_id, store=store)
     assert again.to_arrow().equals(events.to_arrow())
     assert again.statistics() == events.statistics()
-    with pytest.raises(tc.TeamcloneError, match="no match ffff"):
+    with pytest.raises(tc.TeamcloneError, match="no match 'ffff"):
         tc.match_events("ffff", store=store)
     with pytest.raises(UsageError, match="leave out the store"):
         tc.match_events(tc.read_match(log), store=store)

@@ -229,7 +229,8 @@ class Work:
         """
         run = self.out / "runs" / f"{entry.name}-{seed}"
         ended = self.out / "runs" / f"{entry.name}-{seed}.json"
-        overrides = (*self.settings(entry, seed), f"train.threads={self.threads}")
+        settings = self.settings(entry, seed)
+        overrides = (*settings, f"train.threads={self.threads}")
         if not ended.is_file():
             shutil.rmtree(run, ignore_errors=True)
         base = self.out / "runs" / f"{entry.base}-{seed}"
@@ -241,7 +242,6 @@ class Work:
         )
         if seconds is not None:
             write_document(ended, {"seconds": seconds})
-        settings = self.settings(entry, seed)
         config = adaptation(open_run(base), settings)[0] if entry.base else load_config(entry.preset, settings)
         if replace(open_run(run).config, train=config.train) != config:
             sys.exit(f"{run}: trained with other settings; remove it, or choose another --out")

@@ -13,14 +13,11 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from teamclone.comparison.profile import ZONES
 from teamclone.comparison.words import label_of, name_of
 from teamclone.plots.maps import draw_zones
-from teamclone.plots.page import ACCENT, COLOURS, INK, MUTED, SECOND, STYLE, WIDTH
+from teamclone.plots.page import ACCENT, COLOURS, INK, MUTED, SECOND, STYLE, WIDTH, short
 
 _WHOSE = (("original", SECOND, -0.16), ("clone", ACCENT, 0.16))
 _LEAST_UNITS, _MOST_UNITS = 0.1, 100.0
 """Ends of the axis of units; what is beyond stands at its end."""
-
-_LONGEST = 20
-"""Characters of a name that the margin has room for; the server allows fewer."""
 
 Groups = Sequence[Mapping[str, Any]]
 
@@ -120,8 +117,7 @@ def _two_panels(rows: int) -> tuple[Figure, tuple[Any, Any]]:
 
 def _row_name(group: Mapping[str, Any]) -> str:
     """Return opponent and numbers of matches, a name of any length cut to the margin."""
-    name = label_of(group)
-    return f"{name if len(name) <= _LONGEST else f'{name[: _LONGEST - 1]}…'}, {_counts(group)}"
+    return f"{short(label_of(group))}, {_counts(group)}"
 
 
 def _counts(group: Mapping[str, Any]) -> str:

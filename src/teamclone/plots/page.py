@@ -32,6 +32,15 @@ COLOURS = Colours(paper=PAPER, ink=INK, muted=MUTED, rule=RULE, accent=ACCENT, s
 STYLE = style(COLOURS)
 
 
+LONGEST = 20
+"""Characters of a name that a picture has room for; the server allows fewer."""
+
+
+def short(name: str) -> str:
+    """Return a name of any length cut to what a picture has room for."""
+    return name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
+
+
 def page_template(package: str, name: str, /, **filters: Callable[..., Any]) -> jinja2.Template:
     """Return the template of a page out of a package, with filters of its own; what it shows is escaped."""
     environment = jinja2.Environment(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from teamclone.dataset.layout import Split
 from teamclone.errors import TeamcloneError
 from teamclone.evaluation.match_columns import MatchColumns
 from teamclone.evaluation.metrics import MOST_LOSS
@@ -120,7 +121,7 @@ class Foresight:
         """
         there = {one.match_id for one in subject.played}
         matches = [one for one in matches if one.match_id in there]
-        trained = self.run.learned_from()
+        trained = self.run.learned_from(Split.TRAIN, Split.VALIDATION)
         new = [one for one in matches if trained is not None and one.match_id not in trained]
         chosen = (new or matches)[-self.most :]
         looks: list[Look] = []

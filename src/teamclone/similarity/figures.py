@@ -10,17 +10,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from teamclone.plots.page import ACCENT, INK, RULE, STYLE, WIDTH
+from teamclone.plots.page import ACCENT, INK, RULE, STYLE, WIDTH, short
 from teamclone.similarity import geometry
-
-_LONGEST = 20
-"""Characters of a name that a picture has room for; the server allows fewer."""
 
 
 @mpl.rc_context(STYLE)
 def tree(found: Mapping[str, Any]) -> Figure:
     """Draw which teams join at which distance."""
-    names = [_short(team) for team in found["teams"]]
+    names = [short(team) for team in found["teams"]]
     lines = geometry.dendrogram(found["tree"])
     figure = Figure(figsize=(WIDTH, 0.7 + 0.36 * len(names)), layout="constrained")
     axes = figure.subplots()
@@ -48,7 +45,7 @@ def plane(found: Mapping[str, Any]) -> Figure:
         axes.plot(*places[[one, other]].T, color=RULE, linewidth=1.2, zorder=1)
     axes.scatter(places[:, 0], places[:, 1], s=46, color=ACCENT, zorder=2)
     for (x, y), team in zip(places, found["teams"], strict=True):
-        label: Text = axes.annotate(_short(team), (x, y), (0, 7), textcoords="offset points", ha="center", color=INK)
+        label: Text = axes.annotate(short(team), (x, y), (0, 7), textcoords="offset points", ha="center", color=INK)
         label.set_parse_math(False)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.18)
@@ -61,7 +58,3 @@ def shades(values: Sequence[float]) -> list[float]:
     """Return for each of a row's losses how far it lies from the least one, 1 as far as the farthest."""
     least, most = min(values), max(values)
     return [(value - least) / (most - least) if most > least else 0.0 for value in values]
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"

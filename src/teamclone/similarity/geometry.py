@@ -51,14 +51,6 @@ def flat(distance: Floats) -> tuple[Floats, float]:
     return places * np.where(places.sum(0) < 0, -1.0, 1.0), float(values[:2].sum() / total) if total > 0 else 1.0
 
 
-def leaves(merges: list[list[float]]) -> list[int]:
-    """Return the teams in the order in which the tree is drawn without crossings."""
-    from scipy.cluster.hierarchy import leaves_list
-
-    found: list[int] = leaves_list(np.array(merges)).tolist()
-    return found
-
-
 def dendrogram(merges: list[list[float]]) -> dict[str, Any]:
     """Return the lines of the tree, see `scipy.cluster.hierarchy.dendrogram`."""
     from scipy.cluster.hierarchy import dendrogram as lines

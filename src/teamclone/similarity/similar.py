@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from teamclone import __version__
+from teamclone.dataset.layout import Split
 from teamclone.errors import TeamcloneError, UsageError, choose
 from teamclone.evaluation import bootstrap
 from teamclone.evaluation.match_columns import MatchColumns
@@ -101,7 +102,7 @@ def similar(
             "store": masked(store.location),
             "options": {"most": most, "checkpoint": checkpoint, "seed": seed, "level": bootstrap.LEVEL},
             "clones": [
-                {"team": run.team, "run": str(run.path), "dataset": run.dataset_id, "preset": run.config.model.family}
+                {"team": run.team, "run": str(run.path), "dataset": run.dataset_id, "family": run.config.model.family}
                 for run in opened
             ],
             **_compared(watched, list(models), seed),
@@ -173,7 +174,7 @@ def _chosen(
     if unknown := sorted(set(teams) - set(by_team)):
         remedy = choose(unknown[0], sorted(by_team))
         raise UsageError(f"{masked(store.location)}: no matches of {unknown[0]!r}; {remedy}")
-    learned = {run.team: run.learned_from() for run in runs}
+    learned = {run.team: run.learned_from(Split.TRAIN, Split.VALIDATION) for run in runs}
     chosen: list[tuple[str, TeamMatch]] = []
     left_out: list[str] = []
     for team in sorted(teams or by_team):

@@ -25,7 +25,7 @@ class Watched:
     """A team in a match, by frames in which it had something to decide.
 
     Attributes:
-        match_id: of the match. team, opponent: names.
+        match_id: of the match. team: its name.
         loss: (clones, frames) summed log loss of its players' commands, nats, by clone.
         commands: (frames,) how many commands that is.
         kinds: (commands of the clones,) how often each was given.
@@ -33,7 +33,6 @@ class Watched:
 
     match_id: str
     team: str
-    opponent: str | None
     loss: Floats
     commands: Ints
     kinds: Ints
@@ -58,7 +57,7 @@ def watch(models: Mapping[str, Clone], match: MatchColumns, *, side: int) -> Wat
     for model in models.values():
         table = predict_match(model, match, side=side).to_arrow()
         loss = table["log_loss"].to_numpy().astype(np.float64)
-        known = np.isfinite(loss) | np.isposinf(loss)
+        known = ~np.isnan(loss)
         frame = table["frame"].to_numpy()[known]
         sums = np.bincount(frame, np.minimum(loss[known], MOST_LOSS), minlength=n_frames)
         found.append(sums.astype(np.float64, copy=False))
@@ -67,12 +66,9 @@ def watch(models: Mapping[str, Clone], match: MatchColumns, *, side: int) -> Wat
         raise DatasetError(f"{match.match_id}: no command is known that the clones could have predicted")
     done = table["done"].to_numpy(zero_copy_only=False)[known]
     there = commands > 0
-    left, right = match.left, match.right
-    team, opponent = (left, right) if side > 0 else (right, left)
     return Watched(
         match_id=match.match_id,
-        team=str(team),
-        opponent=opponent,
+        team=str(match.left if side > 0 else match.right),
         loss=np.stack(found)[:, there],
         commands=commands[there],
         kinds=np.array([(done == name).sum() for name in names]),

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from teamclone.dataset.layout import Split
-from teamclone.dataset.reader import open_dataset
-from teamclone.errors import DatasetError, UsageError
+from teamclone.errors import UsageError
 from teamclone.models.clone import model_id
 from teamclone.models.config import LOSS_SETTINGS, EgocentricConfig
 from teamclone.system.settings import assignment, table_of
@@ -55,24 +52,12 @@ def adaptation(base: Run, overrides: Sequence[str] = ()) -> tuple[Config, Base]:
         share = config.data.batch_size / base.config.data.batch_size
         config = override(config, [f"model.extra_kicks={math.ceil(share * base.config.model.extra_kicks)}"])
     model = base.load_model(CHECKPOINT)
+    trained_on = base.learned_from(Split.TRAIN)
     origin = {
         "path": str(base.path),
         "checkpoint": CHECKPOINT,
         "model_id": model_id(model),
         "team": base.team,
-        "trained_on": _trained_on(base),
+        "trained_on": None if trained_on is None else sorted(trained_on),
     }
     return config, Base(model=model, origin=origin)
-
-
-def _trained_on(run: Run) -> list[str] | None:
-    """The matches that the weights of a run have learned from, those of its own base among them; None if unknown."""
-    before: list[str] | None = run.environment["base"]["trained_on"] if "base" in run.environment else []
-    try:
-        dataset = open_dataset(run.dataset_path)
-    except DatasetError:
-        return None
-    if before is None or dataset.id != run.dataset_id:
-        return None
-    used = np.unique(dataset.match(dataset.split(Split.TRAIN)).numpy())
-    return sorted({*before, *(dataset.matches[index]["match_id"] for index in used)})

@@ -138,8 +138,8 @@ class Run:
         found = (path.stem for path in (self.path / "checkpoints").glob("[!.]*.safetensors"))
         return sorted(name for name in found if name != RESUME)
 
-    def learned_from(self) -> set[str] | None:
-        """Return the ids of its training and validation matches, and of its base's; None where a dataset is gone."""
+    def learned_from(self, *splits: Split) -> set[str] | None:
+        """Return the ids of the matches that have rows in these splits, and of its base's; None where one is gone."""
         try:
             dataset = open_dataset(self.dataset_path)
         except DatasetError:
@@ -147,8 +147,9 @@ class Run:
         before = self.environment[BASE]["trained_on"] if BASE in self.environment else []
         if before is None or dataset.id != self.dataset_id:
             return None
-        learned = {split.name.lower() for split in (Split.TRAIN, Split.VALIDATION)}
-        return {*before, *(one["match_id"] for one in dataset.matches if one["split"] in learned)}
+        rows = (dataset.match(dataset.split(split)).numpy() for split in splits)
+        used = {index for of_split in rows for index in np.unique(of_split).tolist()}
+        return {*before, *(dataset.matches[index]["match_id"] for index in used)}
 
     def history(self) -> list[dict[str, Any]]:
         """One record per finished epoch.

@@ -122,7 +122,7 @@ def foresight(monkeypatch: pytest.MonkeyPatch, trained: set[str] | None, asked: 
         return look(seen(), table((0, 7, "dash", 0.96))), f"predictions of {match.match_id}"
 
     monkeypatch.setattr(predicted, "look_predicted", foresees)
-    run = _Asked(team=team, path=_Asked(name="run"), learned_from=lambda: trained)
+    run = _Asked(team=team, path=_Asked(name="run"), learned_from=lambda *splits: trained)
     made = object.__new__(predicted.Foresight)
     made.run, made.model, made.most, made.tables = run, None, 2, {}
     return made

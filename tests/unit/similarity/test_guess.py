@@ -11,9 +11,7 @@ from teamclone.similarity.watched import Watched
 
 def watched(team: str, loss: NDArray[np.float64]) -> Watched:
     n = loss.shape[1]
-    return Watched(
-        match_id="m", team=team, opponent="B", loss=loss, commands=np.full(n, 2), kinds=np.array([n, n, 0, 0])
-    )
+    return Watched(match_id="m", team=team, loss=loss, commands=np.full(n, 2), kinds=np.array([n, n, 0, 0]))
 
 
 def test_each_stretch_is_of_the_clone_that_loses_least() -> None:
